@@ -1,4 +1,4 @@
-//! Every way in which a run can end without a result.
+//! All errors of integrators.
 
 mod display;
 mod place;
@@ -7,9 +7,9 @@ pub use place::{Argument, Place, Quantity};
 
 use crate::tableau::TableauError;
 
-/// Why there is no result: what, where, and the values that say so.
+/// The cause of a failed call, with its place and the values that explain it.
 ///
-/// After an error the integrator is usable, and its warm start is as it was before the call.
+/// After an error the integrator remains usable, and its warm start is that before the call.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -31,246 +31,245 @@ use crate::tableau::TableauError;
 #[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// An option has a value that makes no sense.
+    /// An option is out of range.
     InvalidOption {
         /// The option.
         option: &'static str,
         /// Its value.
         value: f64,
-        /// What is wrong with it.
+        /// The reason.
         reason: &'static str,
     },
-    /// A tableau makes no sense.
+    /// A tableau is invalid.
     Tableau(TableauError),
-    /// The tableau that was given to an explicit integrator is implicit.
+    /// The tableau of an explicit integrator is implicit.
     NotExplicit {
-        /// The stage that needs itself or a later one.
+        /// The stage that depends on itself or on a later one.
         stage: usize,
     },
-    /// An argument of a call has an element that is infinite or NaN.
+    /// An element of an argument is infinite or NaN.
     NonFiniteInput {
         /// The argument.
         argument: Argument,
-        /// The element; of matrices in column-major order.
+        /// The index of the element; for matrices in column-major order.
         index: usize,
-        /// What the model calls it; empty of times and lengths.
+        /// The name of the element in the model; empty for times and lengths.
         name: &'static str,
         /// Its value.
         value: f64,
     },
-    /// The model has parameters, and they were never set.
+    /// The model has parameters, and `set_parameters` was not called.
     ParametersNotSet,
-    /// Start values were asked for with `Start::Given`, and they were never given.
+    /// The option is `Start::Given`, and `set_start` was not called.
     StartNotGiven,
     /// The model returned an infinite value or NaN.
     NonFiniteModel {
-        /// What was evaluated.
+        /// The evaluated quantity.
         quantity: Quantity,
-        /// The equation, the row of the residual.
+        /// The equation: the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// Where.
+        /// The place.
         at: Place,
     },
-    /// The model has no finite value where Newton's method starts, or where it leads from there,
-    /// because of the value of an algebraic state.
+    /// The model is not finite at the initial guess of Newton's method or an iterate, because of
+    /// the value of an algebraic state.
     NonFiniteStart {
-        /// What was evaluated.
+        /// The evaluated quantity.
         quantity: Quantity,
-        /// The equation, the row of the residual.
+        /// The equation: the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// The algebraic state with another value of which the equation has one, and where it
-        /// started.
+        /// An algebraic state for which another value makes the equation finite, and its initial
+        /// guess.
         started: Started,
-        /// Where.
+        /// The place.
         at: Place,
     },
     /// The Newton matrix is singular to rounding: with this step size the equations do not
     /// determine the unknowns.
     Singular {
-        /// The unknown whose column depends on those of the unknowns before it: the state whose
+        /// The unknown whose column depends linearly on the preceding ones: the state whose
         /// derivative it is, or the algebraic state.
         unknown: &'static str,
-        /// Where.
+        /// The place.
         at: Place,
     },
-    /// The planned elimination was not good enough here, or Newton's method did not converge with
-    /// it, and the memory of the integrator has no place to pivot the whole matrix:
-    /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also of a model without a plan.
+    /// The planned elimination lost too many digits, or Newton's method did not converge with it,
+    /// and the memory of the integrator excludes pivoting of the whole matrix:
+    /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also for a model without a plan.
     NotPivoted {
         /// The step.
         step: usize,
     },
     /// Newton's method did not converge.
     NotConverged {
-        /// The residual of an equation relative to the magnitude of its terms, the largest.
+        /// The largest residual of an equation relative to the magnitude of its terms.
         residual: f64,
-        /// The equation that has it.
+        /// This equation.
         equation: usize,
-        /// The unknown with the largest last increment relative to its size.
+        /// The unknown with the largest last increment relative to its magnitude.
         unknown: &'static str,
         /// This increment.
         increment: f64,
-        /// Where it ended.
+        /// The place of the last iteration.
         at: Place,
-        /// An algebraic state of these, and its start value; if there is one, and the start was no
-        /// continuation of a solution.
+        /// One of these unknowns that is an algebraic state, and its initial guess; `None` if there
+        /// is none, or if the initial guess continues a solution.
         started: Option<Started>,
     },
     /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
-    /// start values of that step and where the iteration led to: the algebraic equations may have
-    /// lost their solution at a fold.
+    /// initial guess of that step and the last iterate: the solution of the algebraic equations may
+    /// end at a fold.
     SingularAlgebraic {
-        /// The algebraic state along which it does.
+        /// The algebraic state in the kernel of `∂f/∂z`.
         unknown: &'static str,
-        /// Where the iteration ended.
+        /// The place of the last iteration.
         at: Place,
     },
-    /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
-    /// integration starts, or Newton's method does not find them from the values of `set_start`.
+    /// No `ẋ` and `z` satisfy the equations for the initial `x` of an adaptive integration, or
+    /// Newton's method does not find them from the values of `set_start`.
     InconsistentStart {
         /// The time.
         t: f64,
-        /// The equation that is violated most.
+        /// The equation with the largest violation.
         equation: usize,
-        /// By how much: its residual where Newton's method ended.
+        /// Its residual at the last iterate of Newton's method.
         residual: f64,
-        /// The unknown that the equations do not determine, or else the one that moved most: the
-        /// state whose derivative it is, or the algebraic state.
+        /// The unknown that the equations do not determine, otherwise the one with the largest
+        /// increment: the state whose derivative it is, or the algebraic state.
         unknown: &'static str,
-        /// Its value where Newton's method ended.
+        /// Its value at the last iterate of Newton's method.
         value: f64,
         /// Whether the equations do not determine it.
         singular: bool,
     },
-    /// An unknown of the stages, or a result, is beyond the range of the number type.
+    /// An unknown of the stages, or a result, overflows the number type.
     Overflow {
         /// The step.
         step: usize,
-        /// The unknown `(ẋ, z)`, or the element of the result in column-major order.
+        /// The index of the unknown `(ẋ, z)`, or of the element of the result in column-major
+        /// order.
         index: usize,
     },
-    /// A function that is integrated along has a value that is not finite.
+    /// The value of an integrand, event function or jump is not finite.
     NonFiniteFunction {
-        /// Its name.
+        /// The name of the function.
         function: &'static str,
-        /// Which of its outputs.
+        /// The index of the output.
         output: usize,
         /// The value.
         value: f64,
-        /// Where.
+        /// The place.
         at: Place,
     },
-    /// No step size was short enough: an adaptive integrator cannot get beyond this time.
+    /// An adaptive integrator reduced the step size below its minimum.
     StepSizeUnderflow {
-        /// The time that was reached.
+        /// The reached time.
         t: f64,
-        /// The step that would be next.
+        /// The size of the next step.
         h: f64,
-        /// Why the one before was refused.
+        /// The reason of the last rejection.
         reason: Refusal,
-        /// Where Newton's method did not converge: what does not settle.
+        /// The equation and the unknown that do not converge, if Newton's method failed.
         unsettled: Option<Unsettled>,
     },
-    /// An adaptive integrator needs more steps than its options allow.
+    /// An adaptive integrator exceeded [`max_steps`](crate::AdaptiveOptions::max_steps).
     TooManySteps {
-        /// The time that was reached.
+        /// The reached time.
         t: f64,
-        /// How many steps were tried.
+        /// The number of attempted steps.
         steps: usize,
-        /// Whether the method is explicit and its stability limited most of them, not the error.
+        /// Whether the problem is stiff: stability limited most steps of an explicit method.
         stiff: bool,
-        /// The factor by which tolerances have to be larger, if the method is explicit and rounding
-        /// errors of the model limited most steps: then about half of `max_steps` suffice.
+        /// The factor by which to increase the tolerances, if rounding errors of the model limited
+        /// most steps of an explicit method: about half of `max_steps` then suffice.
         rounding: Option<f64>,
     },
-    /// A time outside the interval of the last successful call.
+    /// A time outside of the interval of the last successful call.
     OutsideInterval {
         /// The time.
         t: f64,
-        /// Begin of the interval.
+        /// The start of the interval.
         start: f64,
-        /// End of the interval.
+        /// The end of the interval.
         end: f64,
     },
-    /// Times of a list, ends of intervals or those of outputs, that are not in order: each lies
-    /// between the one before it and the end.
+    /// Ends of intervals or times of outputs that are not in order between the start and the end.
     Unordered {
-        /// Which one of the list.
+        /// The index in the list.
         index: usize,
         /// The time.
         t: f64,
-        /// The time before it, or the start.
+        /// The preceding time, or the start.
         before: f64,
         /// The end.
         end: f64,
     },
-    /// Events come sooner and sooner after each other, without end before a time (the paradox of
-    /// Zeno): from there on a ball that bounces lies on the ground.
+    /// Events accumulate at a time (Zeno's paradox), as when a bouncing ball comes to rest.
     AccumulatingEvents {
-        /// The time at which they accumulate, as far as the last three foretell it.
+        /// The time at which they accumulate, extrapolated from the last four events.
         t: f64,
-        /// The function of the event.
+        /// The name of the event function.
         function: &'static str,
-        /// Which event it is.
+        /// The index of the event.
         event: usize,
-        /// How many events happened.
+        /// The number of events so far.
         events: usize,
     },
-    /// More events than are allowed.
+    /// More events than the maximum.
     TooManyEvents {
-        /// The time that was reached.
+        /// The reached time.
         t: f64,
-        /// How many events happened.
+        /// The number of events so far.
         events: usize,
     },
-    /// A function touches zero and does not cross it: the time of the event has no derivative.
+    /// An event function touches zero without a crossing: the time of the event has no derivative.
     Grazing {
-        /// Which event.
+        /// The index of the event.
         event: usize,
-        /// Its function.
+        /// The name of its function.
         function: &'static str,
         /// Its time.
         t: f64,
     },
-    /// Second derivatives over an event of a function that looks at algebraic states.
+    /// Second derivatives are not available for an event function of algebraic states.
     GuardOfAlgebraicStates {
-        /// The function.
+        /// The name of the function.
         function: &'static str,
     },
-    /// Second derivatives over an event need that nothing there depends on the time; first ones
-    /// over that of a function of algebraic states need it of the model.
+    /// The model or a function depends on time at an event, which second derivatives exclude; first
+    /// derivatives exclude it for event functions of algebraic states.
     DependsOnTime {
-        /// What does.
+        /// The name of the model or function that depends on time.
         function: &'static str,
     },
-    /// Not one control for each interval, or no interval at all.
+    /// The number of controls is not that of the intervals, or there is no interval.
     Intervals {
-        /// How many controls there are.
+        /// The number of controls.
         controls: usize,
-        /// How many ends of intervals there are.
+        /// The number of ends of intervals.
         ends: usize,
     },
-    /// The nodes of the tableau define no polynomial through the stages: there is no dense output,
-    /// and there are no algebraic states at the ends of the interval.
+    /// The nodes of the tableau do not define a polynomial through the stages: there is no dense
+    /// output, and there are no algebraic states at the ends of the interval.
     NoInterpolation,
-    /// A question about the last successful call, and there was none.
+    /// A query about the last successful call, without such a call.
     NoResult,
     /// The end of an interval could not be projected onto the invariants of the model.
     NotProjected {
-        /// The equation of the invariant that is violated most.
+        /// The equation of the invariant with the largest violation.
         equation: u32,
-        /// Which derivative of it the invariant is.
+        /// The order of the derivative of this equation that is the invariant.
         derivative: u32,
-        /// By how much.
+        /// The violation.
         residual: f64,
     },
     /// The memory of a mode could not be allocated.
     OutOfMemory {
-        /// Its size; the largest number if that is not even a number.
+        /// The size; `usize::MAX` if it overflows.
         bytes: usize,
     },
 }
@@ -281,7 +280,7 @@ impl From<TableauError> for Error {
     }
 }
 
-/// Why a step was refused.
+/// The reason of a step rejection.
 ///
 /// ```
 /// # use casados::error::Refusal;
@@ -302,25 +301,25 @@ impl From<TableauError> for Error {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Its estimated error was too large.
+    /// The estimated error was too large.
     Error,
     /// Newton's method did not converge.
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
     /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
-    /// equations meet there, and none is beyond (a fold).
+    /// equations merge, and none exists beyond (a fold).
     SingularAlgebraic {
-        /// The algebraic state along which it does.
+        /// The algebraic state in the kernel of `∂f/∂z`.
         unknown: &'static str,
     },
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
-    /// The interval is shorter than the distance of the time from the next number.
+    /// The interval is shorter than the resolution of the time.
     Resolution,
 }
 
-/// An algebraic state, and where Newton's method started for it.
+/// An algebraic state and its initial guess.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -341,13 +340,13 @@ pub enum Refusal {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Started {
-    /// Its name.
+    /// The name of the state.
     pub unknown: &'static str,
-    /// Its start value.
+    /// The initial guess.
     pub value: f64,
 }
 
-/// What does not settle where Newton's method converges in no step, however short.
+/// The equation and the unknown for which Newton's method fails at every step size.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -366,14 +365,14 @@ pub struct Started {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Unsettled {
-    /// The equation with the largest residual beside its terms, where the last iteration ended.
+    /// The equation with the largest residual relative to its terms at the last iterate.
     pub equation: usize,
-    /// This residual relative to the terms.
+    /// This relative residual.
     pub residual: f64,
-    /// The unknown that the last increment changed most beside its tolerance: the state whose
+    /// The unknown with the largest last increment relative to its tolerance: the state whose
     /// derivative it is, or the algebraic state.
     pub unknown: &'static str,
-    /// The value of this state at the time that was reached.
+    /// The value of this state at the reached time.
     pub value: f64,
     /// Whether it is an algebraic state.
     pub algebraic: bool,

@@ -1,4 +1,4 @@
-//! Finite checks: of what is given, and of what is returned.
+//! Checks that inputs and results are finite.
 
 use crate::error::{Argument, Error};
 use crate::linalg::{are_finite, kernels};
@@ -7,7 +7,7 @@ use crate::result::{Forward, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain};
 
-/// Of what has no names: times and lengths.
+/// Checks an argument without names: times and lengths.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
@@ -18,7 +18,7 @@ pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(
     }
 }
 
-/// Of what the model has names for.
+/// Checks an argument whose elements have names in the model.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
@@ -31,7 +31,7 @@ pub(crate) fn check_model_input<M: Dae, T: Real>(argument: Argument, values: &[T
     }
 }
 
-/// What the model calls an element of an argument; of several columns each has these names.
+/// The name of an element of an argument in the model; the same in all columns.
 pub(crate) fn element_name<M: Dae>(argument: Argument, index: usize) -> &'static str {
     let structure = &M::STRUCTURE;
     let names = match argument {
@@ -45,7 +45,7 @@ pub(crate) fn element_name<M: Dae>(argument: Argument, index: usize) -> &'static
 }
 
 /// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
+/// [`Error::Overflow`] for the first element that is not finite.
 pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
     match find_non_finite(values) {
         Some((index, _)) => Err(Error::Overflow { step, index }),
@@ -54,7 +54,7 @@ pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Err
 }
 
 /// # Errors
-/// [`Error::Overflow`] of the first derivative that is not finite.
+/// [`Error::Overflow`] for the first derivative that is not finite.
 #[cfg_attr(feature = "std", inline(never))]
 pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
     for values in [
@@ -73,10 +73,10 @@ pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize
     Ok(())
 }
 
-/// A gradient by `x₀`, `u` and `p`.
+/// Checks a gradient with respect to `x₀`, `u` and `p`.
 ///
 /// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
+/// [`Error::Overflow`] for the first element that is not finite.
 #[inline(always)]
 pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), Error> {
     check_output(x0, 0)?;
@@ -85,7 +85,7 @@ pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), 
 }
 
 /// # Errors
-/// [`Error::Overflow`] of the first second derivative that is not finite.
+/// [`Error::Overflow`] for the first second derivative that is not finite.
 pub(crate) fn check_second_derivatives<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
     for values in result.second_derivative_blocks() {
         check_output(values, 0)?;
@@ -105,7 +105,7 @@ impl<M: Dae, T: Plain> Hessian<M, T> {
 /// The first element that is infinite or NaN.
 #[inline]
 pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
-    // A few are looked at before the function for many is entered.
+    // Short slices are checked inline.
     let finite = if values.len() < 16 { are_finite(values) } else { are_all_finite(values) };
     if finite {
         return None;
@@ -113,8 +113,8 @@ pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     first_non_finite(values)
 }
 
-/// The first of elements that are not all finite. Without an operating system callers see where it
-/// may be.
+/// The first non-finite element of a slice that has one. Inlined without `std`: the optimiser then
+/// removes bounds checks.
 #[cfg_attr(feature = "std", cold, inline(never))]
 #[cfg_attr(not(feature = "std"), inline(always))]
 fn first_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {

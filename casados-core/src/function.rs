@@ -1,9 +1,9 @@
-//! Functions of the variables of a model: integrands, events, costs, constraints.
+//! Functions of the variables of a model: integrands, event functions, costs, constraints.
 //!
 //! A function `y(x, z, u, p, t)` with `y ∈ R^{ny}` takes the variables of a model, one flat array
-//! `v = (ẋ, x, z, u, p, t)` as in [`Dae`](crate::Dae), and depends on all but `ẋ`. It belongs to
+//! `v = (ẋ, x, z, u, p, t)` as in [`Dae`](crate::Dae), and is independent of `ẋ`. It applies to
 //! every model of its dimensions: `F: Function<Shape = M::Shape>`. The attribute `#[function]`
-//! writes it, with its derivatives, from a Rust function that names the arguments of the model:
+//! derives it, with its derivatives, from a Rust function with the arguments of the model:
 //!
 //! ```text
 //! #[function]
@@ -147,12 +147,12 @@ pub type MatrixYU<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYU<<F as 
 /// ```
 pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as Function>::Shape, T>;
 
-/// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by
+/// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: implemented by
 /// `#[function]`.
 ///
-/// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
-/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables, by `t` only the
-/// first ones ([`Function::time_derivative`]).
+/// The entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
+/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables; the derivative
+/// with respect to `t` is of first order only ([`Function::time_derivative`]).
 ///
 /// ```
 /// use casados::prelude::*;
@@ -182,41 +182,41 @@ pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as 
     note = "write it as `#[function] fn name(x: [f64; NX], ...) -> [f64; NY]` and use its type, `Name`"
 )]
 pub trait Function: 'static {
-    /// Dimensions of the model.
+    /// The dimensions of the model.
     type Shape: Shape;
     /// The number of outputs.
     type Outputs: Outputs;
-    /// Values of the structural non-zeros of `∂y/∂(ẋ, x, z, u, p)`, of which `ẋ` has none.
+    /// Values of the structural non-zeros of `∂y/∂(ẋ, x, z, u, p)`; the block of `ẋ` is empty.
     type Jacobian<T: Plain>: Array<T>;
-    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ y)` over
-    /// `(ẋ, x, z, u, p)`.
+    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ y)` with respect to `(ẋ,
+    /// x, z, u, p)`.
     type Hessian<T: Plain>: Array<T>;
-    /// What is known about the function before it runs.
+    /// The structure of the function, a compile-time constant.
     const STRUCTURE: FunctionStructure;
     /// The units of the variables, as [`Dae::UNITS`](crate::Dae::UNITS).
     const UNITS: Units = Units::NONE;
-    /// The unit of all outputs: what stands behind a comma in the first paragraph of the doc
-    /// comment, as `/// Tension of the tether, N.`
+    /// The unit of all outputs, given after a comma in the first paragraph of the doc comment: `///
+    /// Tension of the tether, N.`
     const UNIT: &'static str = "";
-    /// Whether it depends on the time that integrators have.
+    /// Whether the function depends on time.
     const IS_TIMED: bool = false;
 
     /// The value `y(v)`.
     fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);
 
-    /// The constant entries of the Jacobian; the others are left as they are. Called once for
-    /// every array that [`Function::value_jacobian`] will fill.
+    /// Writes the constant entries of the Jacobian; other entries are unchanged. Called once for
+    /// every array passed to [`Function::value_jacobian`].
     fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>);
 
-    /// The value and the entries of the Jacobian that are not constant.
+    /// The value and the non-constant entries of the Jacobian.
     fn value_jacobian<S: Lanes>(
         v: &ArrayV<Self, S::Cell>,
         y: &mut ArrayY<Self, S::Cell>,
         jacobian: &mut Self::Jacobian<S::Cell>,
     );
 
-    /// The gradient `∇ᵥ(μᵀ y)` over `(ẋ, x, z, u, p)`. The elements of `ẋ` and the last, that of
-    /// `t`, are set to zero.
+    /// The gradient `∇ᵥ(μᵀ y)` with respect to `(ẋ, x, z, u, p)`. The elements of `ẋ` and `t` are
+    /// set to zero.
     fn adjoint<S: Lanes>(
         v: &ArrayV<Self, S::Cell>,
         mu: &ArrayY<Self, S::Cell>,
@@ -234,8 +234,8 @@ pub trait Function: 'static {
     );
 }
 
-/// A function whose code is generic over every scalar: duals and complex numbers included, which is
-/// what independent checks of its derivatives need.
+/// A function whose code is generic over every scalar type, including dual and complex numbers, for
+/// independent checks of its derivatives.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -259,7 +259,7 @@ pub trait GraphFunction: Function {
     fn adjoint_of<S: Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]);
 }
 
-/// What is known about a function before it runs.
+/// The structure of a function, a compile-time constant.
 ///
 /// ```
 /// # use casados::function::*;
@@ -284,33 +284,33 @@ pub trait GraphFunction: Function {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FunctionStructure {
-    /// Name of the function.
+    /// The name of the function.
     pub name: &'static str,
-    /// Names of the differential states, such as `x[3]` or `cart.position`.
+    /// The names of the differential states, such as `x[3]` or `cart.position`.
     pub x: &'static [&'static str],
-    /// Names of the algebraic states.
+    /// The names of the algebraic states.
     pub z: &'static [&'static str],
-    /// Names of the controls.
+    /// The names of the controls.
     pub u: &'static [&'static str],
-    /// Names of the parameters.
+    /// The names of the parameters.
     pub p: &'static [&'static str],
-    /// Non-zeros of the Jacobian: output, variable. In order of the blocks `y_ẋ` (empty),
-    /// `y_x, y_z, y_u, y_p`, within each by row, then by column.
+    /// The non-zeros of the Jacobian: output, variable. Ordered by the blocks `y_ẋ` (empty), `y_x,
+    /// y_z, y_u, y_p`, within each by row, then by column.
     pub jacobian: Pattern,
-    /// Where each of the five blocks begins in `jacobian`, and its end.
+    /// The offsets of the five blocks in `jacobian`, and its length.
     pub blocks: [usize; 6],
-    /// The entries of `y_x, y_z, y_u`, output by output: what [`by_row`] makes of them.
+    /// The entries of `y_x, y_z, y_u`, output by output, as returned by [`by_row`].
     pub by_row: &'static [u32],
-    /// Where each output begins in `by_row`, and the end of that: what [`begins`] makes of it.
+    /// The offset of each output in `by_row`, and its length, as returned by [`begins`].
     pub begins: &'static [u32],
-    /// Entries of the Jacobian that are constant.
+    /// Whether each entry of the Jacobian is constant.
     pub constant: &'static [bool],
-    /// Non-zeros of the lower triangle of `∇²(μᵀ y)`: variable ≥ variable.
+    /// The non-zeros of the lower triangle of `∇²(μᵀ y)`: variable ≥ variable.
     pub hessian: Pattern,
-    /// Outputs that are linear in `(x, z, u, p)` jointly: they have no second derivatives.
+    /// Whether each output is linear in `(x, z, u, p)` jointly, without second derivatives.
     pub linear: &'static [bool],
-    /// Variables that the function depends on, ascending: columns of `jacobian`.
+    /// The variables that the function depends on, ascending: non-empty columns of `jacobian`.
     pub variables: &'static [u32],
-    /// Numbers of arithmetic operations; what is called `f` there is `y`.
+    /// Numbers of arithmetic operations; `f` there is `y` here.
     pub operations: Operations,
 }

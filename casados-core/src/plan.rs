@@ -1,44 +1,43 @@
-//! What kernels know of a model, bound when they are compiled or when they run.
+//! The structure of a model for kernels, bound at compile time or at run time.
 //!
-//! | | kernels are compiled | loops over tables | lengths |
+//! | plan | kernels are compiled | loops over tables | lengths |
 //! | --- | --- | --- | --- |
-//! | [`Known<M>`](Known) | for each model | unrolled where they are short | constants |
+//! | [`Known<M>`](Known) | for each model | unrolled if short | constants |
 //! | [`&'static ModelTable`](ModelTable) | once for all models | loops | read |
 //!
-//! A kernel is generic over its plan and has it as a value, which is nothing at all where the model
-//! is known. Decisions that need constants ask [`Plan::KNOWN_STRUCTURE`].
+//! A kernel is generic over its plan and takes it as a value, which has size zero for a known
+//! model. Compile-time decisions use [`Plan::KNOWN_STRUCTURE`].
 
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::shape::{Plain, Shape};
 use crate::structure::{Kinematic, Structure};
 use core::marker::PhantomData;
 
-/// What has so many elements: an array where the model is known, or a slice.
+/// Storage of a fixed number of elements: an array for a known model, otherwise a slice.
 pub trait Elements<T>: AsRef<[T]> + AsMut<[T]> {}
 impl<T, A: AsRef<[T]> + AsMut<[T]> + ?Sized> Elements<T> for A {}
 
-/// The plan by which a kernel computes.
+/// The plan of a kernel.
 pub trait Plan: Copy + Send + Sync + 'static {
-    /// The structure of the model, if kernels are compiled for that one.
+    /// The structure of the model, if kernels are compiled for it.
     const KNOWN_STRUCTURE: Option<&'static Structure>;
-    /// How many columns there is memory for where directions are computed side by side, if that is
-    /// known.
+    /// The number of columns in memory for directions that are computed together, if known.
     const NC: usize;
 
-    /// An element for each differential state.
+    /// One element for each differential state.
     type X<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each unknown of a stage, or for each equation.
+    /// One element for each unknown of a stage, or for each equation.
     type K<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each variable.
+    /// One element for each variable.
     type V<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each entry of the Jacobian.
+    /// One element for each entry of the Jacobian.
     type Jacobian<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each block of the factors.
+    /// One element for each block of the factors.
     type Factors<T: Plain>: Elements<T> + ?Sized;
 
     /// The structure of the model.
     fn structure(self) -> &'static Structure;
-    /// What follows from it.
+    /// Facts derived from the structure.
     fn facts(self) -> &'static DerivedFacts;
 
     /// The number of differential states.
@@ -72,8 +71,7 @@ pub trait Plan: Copy + Send + Sync + 'static {
         self.nx() + self.nu() + self.structure().p.len()
     }
 
-    /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it
-    /// is.
+    /// The row of right-hand sides that belongs to an equation: that of its pivot unknown.
     #[inline(always)]
     fn slot(self, equation: usize) -> usize {
         match self.structure().elimination.slot_of_equation.get(equation) {
@@ -82,13 +80,13 @@ pub trait Plan: Copy + Send + Sync + 'static {
         }
     }
 
-    /// What is known of the state of a slot, if it is [kinematic](Kinematic).
+    /// The description of the [kinematic](Kinematic) state in a slot, if it is one.
     #[inline(always)]
     fn kinematic(self, slot: usize) -> Option<&'static Kinematic> {
         kinematic(self.structure(), slot)
     }
 
-    /// The state that is the velocity of a kinematic one, if it is a state.
+    /// The index of the state that is the velocity of a kinematic state, if it is a state.
     #[inline(always)]
     fn velocity(self, of: &Kinematic) -> Option<usize> {
         let (nx, velocity) = (self.nx(), of.velocity as usize);
@@ -105,25 +103,25 @@ pub trait Plan: Copy + Send + Sync + 'static {
     }
 }
 
-/// A plan of this model, which takes the arrays that the model has.
+/// The plan of a model, with conversions from its arrays.
 pub trait PlanOf<M: Dae>: Plan {
-    /// An element for each differential state.
+    /// One element for each differential state.
     fn x<T: Plain>(of: &ArrayX<M, T>) -> &Self::X<T>;
-    /// An element for each unknown of a stage, or for each equation.
+    /// One element for each unknown of a stage, or for each equation.
     fn k<T: Plain>(of: &ArrayK<M, T>) -> &Self::K<T>;
-    /// The same.
+    /// Mutable version of [`PlanOf::k`].
     fn k_mut<T: Plain>(of: &mut ArrayK<M, T>) -> &mut Self::K<T>;
-    /// An element for each variable.
+    /// One element for each variable.
     fn v<T: Plain>(of: &ArrayV<M, T>) -> &Self::V<T>;
-    /// The same.
+    /// Mutable version of [`PlanOf::v`].
     fn v_mut<T: Plain>(of: &mut ArrayV<M, T>) -> &mut Self::V<T>;
-    /// An element for each entry of the Jacobian.
+    /// One element for each entry of the Jacobian.
     fn jacobian<T: Plain>(of: &M::Jacobian<T>) -> &Self::Jacobian<T>;
-    /// An element for each block of the factors.
+    /// One element for each block of the factors.
     fn factors_mut<T: Plain>(of: &mut M::Factors<T>) -> &mut Self::Factors<T>;
 }
 
-/// Arrays of a model as a plan has them.
+/// Converts the arrays of a model to those of a plan.
 macro_rules! arrays {
     ($M:ident: $of:ident => $as_ref:expr, $as_mut:expr) => {
         #[inline(always)]
@@ -161,7 +159,7 @@ macro_rules! arrays {
 pub struct Known<M>(PhantomData<fn() -> M>);
 
 impl<M> Known<M> {
-    /// Its only value.
+    /// The only value.
     pub const PLAN: Self = Self(PhantomData);
 }
 
@@ -175,7 +173,7 @@ impl<M> Copy for Known<M> {}
 
 impl<M: Dae> Plan for Known<M> {
     const KNOWN_STRUCTURE: Option<&'static Structure> = Some(&M::STRUCTURE);
-    // As many as the rows of `ArrayC` have.
+    // The number of columns in the rows of `ArrayC`.
     const NC: usize = if cfg!(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
         M::Shape::NC
     } else {
@@ -200,7 +198,7 @@ impl<M: Dae> PlanOf<M> for Known<M> {
     arrays!(M: of => of, of);
 }
 
-/// The plan of any model, which kernels read when they run.
+/// The plan of any model, read by kernels at run time.
 #[derive(Debug)]
 pub struct ModelTable {
     structure: &'static Structure,
@@ -208,7 +206,7 @@ pub struct ModelTable {
 }
 
 impl ModelTable {
-    /// That of a model.
+    /// The plan of a model.
     pub const fn of(structure: &'static Structure) -> Self {
         Self { structure, facts: DerivedFacts::of(structure) }
     }
@@ -236,7 +234,7 @@ impl<M: Dae> PlanOf<M> for &'static ModelTable {
     arrays!(M: of => of.as_ref(), of.as_mut());
 }
 
-/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+/// The description of the [kinematic](Kinematic) state in a slot, if it is one.
 #[inline(always)]
 pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Kinematic> {
     let kinematic = structure.elimination.kinematic;
@@ -247,22 +245,23 @@ pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Ki
     }
 }
 
-/// What follows from a structure, found when the model is compiled.
+/// Facts derived from a structure at compile time.
 #[derive(Debug)]
 pub struct DerivedFacts {
-    /// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
+    /// The range of the unknowns from the first to the last that is not kinematic: `(first, end)`.
     pub non_kinematic_range: (usize, usize),
-    /// Terms of the Newton matrix that are fill.
+    /// The number of terms of the Newton matrix that are fill.
     pub fill_terms: usize,
-    /// How many curved variables come before the first state, and before the first algebraic state.
+    /// The numbers of nonlinear variables before the first state, and before the first algebraic
+    /// state.
     pub nonlinear_before: [usize; 2],
-    /// Whether each equation that has a derivative has that of one state, in their order: the
-    /// entries of `f_ẋ` then are those of the states.
+    /// Whether each equation with a derivative contains that of one state, in the order of the
+    /// states: the entries of `f_ẋ` are then those of the states.
     pub has_direct_rates: bool,
 }
 
 impl DerivedFacts {
-    /// Those of a structure.
+    /// The facts of a structure.
     pub const fn of(structure: &Structure) -> Self {
         let nx = structure.x.len();
         Self {
@@ -274,8 +273,8 @@ impl DerivedFacts {
     }
 }
 
-/// How many of some numbers, in their order, come before one: of directions that have any
-/// influence, of curved variables.
+/// The number of elements before `number` in an ascending list: of influential directions, or of
+/// nonlinear variables.
 pub const fn count_before(numbers: &[u32], number: usize) -> usize {
     let mut count = 0;
     while count < numbers.len() && (numbers[count] as usize) < number {
@@ -295,7 +294,7 @@ const fn non_kinematic_range(structure: &Structure) -> (usize, usize) {
     (first, end)
 }
 
-/// See [`Facts`].
+/// See [`DerivedFacts`].
 pub const fn has_direct_rates(structure: &Structure) -> bool {
     let (count, pattern) = (structure.blocks[1], &structure.jacobian);
     let mut entry = 0;
@@ -308,20 +307,20 @@ pub const fn has_direct_rates(structure: &Structure) -> bool {
     count == structure.x.len()
 }
 
-/// A table of the structure that kernels go through, row by row.
+/// A table of the structure, which kernels traverse row by row.
 #[derive(Clone, Copy)]
 pub enum StructureTable {
     /// The terms of the Newton matrix, fill first.
     Assembly,
-    /// Those of them that are fill.
+    /// The terms that are fill.
     Fill,
-    /// Entries by which equations depend on kinematic states.
+    /// The entries of equations with respect to kinematic states.
     Dependents,
-    /// States up to the last that is kinematic.
+    /// The states up to the last kinematic one.
     Kinematic,
-    /// Unknowns of a stage.
+    /// The unknowns of a stage.
     Unknowns,
-    /// Entries of the Jacobian from the beginning of a block to that of another.
+    /// The entries of the Jacobian from the start of a block to that of another.
     Entries(usize, usize),
 }
 
@@ -329,7 +328,7 @@ impl StructureTable {
     /// All entries of the Jacobian.
     pub const JACOBIAN: Self = Self::Entries(0, 5);
 
-    /// How many rows it has.
+    /// The number of rows.
     #[inline(always)]
     pub const fn row_count(self, structure: &Structure) -> usize {
         let Structure { elimination, blocks, x, z, .. } = structure;
@@ -343,7 +342,7 @@ impl StructureTable {
         }
     }
 
-    /// How many it has where kernels are compiled for one model.
+    /// The number of rows, if kernels are compiled for one model.
     pub const fn known_row_count<P: Plan>(self) -> Option<usize> {
         match P::KNOWN_STRUCTURE {
             Some(structure) => Some(self.row_count(structure)),
@@ -351,7 +350,7 @@ impl StructureTable {
         }
     }
 
-    /// Whether it may have any.
+    /// Whether the table may have rows.
     pub const fn may_have_rows<P: Plan>(self) -> bool {
         !matches!(self.known_row_count::<P>(), Some(0))
     }

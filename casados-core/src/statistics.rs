@@ -1,6 +1,6 @@
-//! What the last call did.
+//! Statistics of the last call.
 
-/// What the last call did, successful or not.
+/// Statistics of the last call, successful or not.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -20,24 +20,23 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// Steps that were completed.
+    /// Completed steps.
     pub steps: usize,
-    /// Iterations of Newton's method, all steps together.
+    /// Iterations of Newton's method, summed over all steps.
     pub iterations: usize,
-    /// Evaluations of the residual alone at all stages; of an explicit method, of one stage.
+    /// Evaluations of the residual at all stages; for explicit methods, at one stage.
     pub residuals: usize,
     /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the
-    /// Jacobian in their middle; of an explicit method, of one stage.
+    /// Jacobian in their middle; for explicit methods, at one stage.
     pub jacobians: usize,
     /// Factorisations of the Newton matrix.
     pub factorizations: usize,
-    /// Those of them in which the planned elimination was not good enough, so that the whole matrix
-    /// was pivoted.
+    /// Factorisations with the dense fallback, since the planned elimination lost too many digits.
     pub dense: usize,
 }
 
 impl Statistics {
-    /// What another call did.
+    /// Adds the statistics of another call.
     pub(crate) fn add(&mut self, other: &Self) {
         self.steps += other.steps;
         self.iterations += other.iterations;
