@@ -104,7 +104,7 @@ impl Panel {
         self
     }
 
-    /// Adds a curve; later curves are drawn behind it.
+    /// Adds a curve; later curves are drawn over it.
     #[must_use]
     pub fn with(mut self, curve: Curve) -> Self {
         self.series.push(curve);
