@@ -1,4 +1,4 @@
-//! All errors of integrators.
+//! Errors of all calls.
 
 mod display;
 mod place;
@@ -7,9 +7,9 @@ pub use place::{Argument, Place, Quantity};
 
 use crate::tableau::TableauError;
 
-/// The cause of a failed call, with its place and the values that explain it.
+/// The reason why there is no result, with its place and values.
 ///
-/// After an error the integrator remains usable, and its warm start is that before the call.
+/// After an error the integrator is usable, and its warm start is as before the call.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -31,175 +31,176 @@ use crate::tableau::TableauError;
 #[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// An option is out of range.
+    /// An option has an invalid value.
     InvalidOption {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// Value of the option.
         value: f64,
-        /// The reason.
+        /// The rule that it violates.
         reason: &'static str,
     },
     /// A tableau is invalid.
     Tableau(TableauError),
-    /// The tableau of an explicit integrator is implicit.
+    /// An implicit tableau was given to an explicit integrator.
     NotExplicit {
-        /// The stage that depends on itself or on a later one.
+        /// The stage that depends on itself or a later one.
         stage: usize,
     },
-    /// An element of an argument is infinite or NaN.
+    /// An argument of a call has an element that is infinite or NaN.
     NonFiniteInput {
         /// The argument.
         argument: Argument,
-        /// The index of the element; for matrices in column-major order.
+        /// Index of the element; in column-major order for matrices.
         index: usize,
-        /// The name of the element in the model; empty for times and lengths.
+        /// Name of the element in the model; empty for times and lengths.
         name: &'static str,
-        /// Its value.
+        /// Value of the element.
         value: f64,
     },
-    /// The model has parameters, and `set_parameters` was not called.
+    /// The model has parameters that were never set.
     ParametersNotSet,
-    /// The option is `Start::Given`, and `set_start` was not called.
+    /// `Start::Given` is set, but start values were never given.
     StartNotGiven,
     /// The model returned an infinite value or NaN.
     NonFiniteModel {
-        /// The evaluated quantity.
+        /// The quantity that was evaluated.
         quantity: Quantity,
-        /// The equation: the row of the residual.
+        /// The equation, the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// The place.
+        /// Place of the evaluation.
         at: Place,
     },
-    /// The model is not finite at the initial guess of Newton's method or an iterate, because of
-    /// the value of an algebraic state.
+    /// The model has no finite value at the start values of Newton's method, or at a later iterate,
+    /// because of the value of an algebraic state.
     NonFiniteStart {
-        /// The evaluated quantity.
+        /// The quantity that was evaluated.
         quantity: Quantity,
-        /// The equation: the row of the residual.
+        /// The equation, the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// An algebraic state for which another value makes the equation finite, and its initial
-        /// guess.
+        /// The algebraic state that causes it (the equation has a finite value at another value of
+        /// the state), and its start value.
         started: Started,
-        /// The place.
+        /// Place of the evaluation.
         at: Place,
     },
     /// The Newton matrix is singular to rounding: with this step size the equations do not
     /// determine the unknowns.
     Singular {
-        /// The unknown whose column depends linearly on the preceding ones: the state whose
-        /// derivative it is, or the algebraic state.
+        /// The unknown whose column depends linearly on the preceding ones: an algebraic state, or
+        /// the state of a derivative.
         unknown: &'static str,
-        /// The place.
+        /// Place of the matrix.
         at: Place,
     },
-    /// The planned elimination lost too many digits, or Newton's method did not converge with it,
-    /// and the memory of the integrator excludes pivoting of the whole matrix:
+    /// The planned elimination was too inaccurate, or Newton's method did not converge with it, and
+    /// the integrator has no dense fallback:
     /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also for a model without a plan.
     NotPivoted {
-        /// The step.
+        /// Index of the step.
         step: usize,
     },
     /// Newton's method did not converge.
     NotConverged {
-        /// The largest residual of an equation relative to the magnitude of its terms.
+        /// The largest residual of an equation, relative to the magnitude of its terms.
         residual: f64,
-        /// This equation.
+        /// The equation with this residual.
         equation: usize,
-        /// The unknown with the largest last increment relative to its magnitude.
+        /// The unknown with the largest last increment relative to its size.
         unknown: &'static str,
-        /// This increment.
+        /// The increment of this unknown.
         increment: f64,
-        /// The place of the last iteration.
+        /// Place of the last iteration.
         at: Place,
-        /// One of these unknowns that is an algebraic state, and its initial guess; `None` if there
-        /// is none, or if the initial guess continues a solution.
+        /// This unknown if it is an algebraic state, or an algebraic state of the equation, with
+        /// its start value; `None` if there is none, or if the iteration started from a solution.
         started: Option<Started>,
     },
-    /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
-    /// initial guess of that step and the last iterate: the solution of the algebraic equations may
-    /// end at a fold.
+    /// Newton's method did not converge in a later step, and `∂f/∂(ẋ, z)` becomes singular between
+    /// the initial guess of that step and the last iterate: the solution of the algebraic equations
+    /// may end at a fold.
     SingularAlgebraic {
-        /// The algebraic state in the kernel of `∂f/∂z`.
+        /// The algebraic state along which the matrix becomes singular.
         unknown: &'static str,
-        /// The place of the last iteration.
+        /// Place of the last iteration.
         at: Place,
     },
-    /// No `ẋ` and `z` satisfy the equations for the initial `x` of an adaptive integration, or
-    /// Newton's method does not find them from the values of `set_start`.
+    /// No consistent `ẋ` and `z` exist for the initial `x` of an adaptive integration, or Newton's
+    /// method does not find them from the values of `set_start`.
     InconsistentStart {
         /// The time.
         t: f64,
         /// The equation with the largest violation.
         equation: usize,
-        /// Its residual at the last iterate of Newton's method.
+        /// Residual of this equation at the last iterate.
         residual: f64,
         /// The unknown that the equations do not determine, otherwise the one with the largest
-        /// increment: the state whose derivative it is, or the algebraic state.
+        /// change: an algebraic state, or the state of a derivative.
         unknown: &'static str,
-        /// Its value at the last iterate of Newton's method.
+        /// Value of the unknown at the last iterate.
         value: f64,
-        /// Whether the equations do not determine it.
+        /// Whether the equations do not determine the unknown.
         singular: bool,
     },
-    /// An unknown of the stages, or a result, overflows the number type.
+    /// An unknown of the stages or a result exceeds the range of the number type.
     Overflow {
-        /// The step.
+        /// Index of the step.
         step: usize,
-        /// The index of the unknown `(ẋ, z)`, or of the element of the result in column-major
-        /// order.
+        /// Index of the unknown `(ẋ, z)`, or of the element of the result in column-major order.
         index: usize,
     },
-    /// The value of an integrand, event function or jump is not finite.
+    /// An integrand, event function or jump has a value that is not finite.
     NonFiniteFunction {
-        /// The name of the function.
+        /// Name of the function.
         function: &'static str,
-        /// The index of the output.
+        /// Index of the output.
         output: usize,
         /// The value.
         value: f64,
-        /// The place.
+        /// Place of the evaluation.
         at: Place,
     },
-    /// An adaptive integrator reduced the step size below its minimum.
+    /// The step size underflows: an adaptive integrator cannot continue beyond this time.
     StepSizeUnderflow {
-        /// The reached time.
+        /// The time that was reached.
         t: f64,
-        /// The size of the next step.
+        /// The next step size.
         h: f64,
-        /// The reason of the last rejection.
+        /// Why the last step was rejected.
         reason: Refusal,
-        /// The equation and the unknown that do not converge, if Newton's method failed.
+        /// If Newton's method did not converge: the equation and the unknown that do not settle.
         unsettled: Option<Unsettled>,
     },
-    /// An adaptive integrator exceeded [`max_steps`](crate::AdaptiveOptions::max_steps).
+    /// An adaptive integrator exceeds the maximal number of steps.
     TooManySteps {
-        /// The reached time.
+        /// The time that was reached.
         t: f64,
-        /// The number of attempted steps.
+        /// Number of attempted steps.
         steps: usize,
-        /// Whether the problem is stiff: stability limited most steps of an explicit method.
+        /// Whether the method is explicit, and most steps were limited by its stability instead of
+        /// the error.
         stiff: bool,
-        /// The factor by which to increase the tolerances, if rounding errors of the model limited
-        /// most steps of an explicit method: about half of `max_steps` then suffice.
+        /// Factor by which tolerances must be increased, if the method is explicit and most steps
+        /// were limited by rounding errors of the model: about half of `max_steps` then suffice.
         rounding: Option<f64>,
     },
-    /// A time outside of the interval of the last successful call.
+    /// A time outside the interval of the last successful call.
     OutsideInterval {
         /// The time.
         t: f64,
-        /// The start of the interval.
+        /// Start of the interval.
         start: f64,
-        /// The end of the interval.
+        /// End of the interval.
         end: f64,
     },
-    /// Ends of intervals or times of outputs that are not in order between the start and the end.
+    /// Times in a list (ends of intervals, or output times) are not in order: each must lie between
+    /// the preceding one and the end.
     Unordered {
-        /// The index in the list.
+        /// Index in the list.
         index: usize,
         /// The time.
         t: f64,
@@ -208,68 +209,71 @@ pub enum Error {
         /// The end.
         end: f64,
     },
-    /// Events accumulate at a time (Zeno's paradox), as when a bouncing ball comes to rest.
+    /// Events accumulate at a time (Zeno's paradox), as those of a bouncing ball before it comes to
+    /// rest.
     AccumulatingEvents {
-        /// The time at which they accumulate, extrapolated from the last four events.
+        /// The accumulation time, extrapolated from the last three events.
         t: f64,
-        /// The name of the event function.
+        /// The event function.
         function: &'static str,
-        /// The index of the event.
+        /// Index of the event.
         event: usize,
-        /// The number of events so far.
+        /// Number of events so far.
         events: usize,
     },
-    /// More events than the maximum.
+    /// The number of events exceeds its maximum.
     TooManyEvents {
-        /// The reached time.
+        /// The time that was reached.
         t: f64,
-        /// The number of events so far.
+        /// Number of events so far.
         events: usize,
     },
-    /// An event function touches zero without a crossing: the time of the event has no derivative.
+    /// An event function touches zero without crossing it (grazing): the event time has no
+    /// derivative.
     Grazing {
-        /// The index of the event.
+        /// Index of the event.
         event: usize,
-        /// The name of its function.
+        /// The event function.
         function: &'static str,
-        /// Its time.
+        /// The event time.
         t: f64,
     },
-    /// Second derivatives are not available for an event function of algebraic states.
+    /// Second derivatives across an event whose function depends on algebraic states are not
+    /// available.
     GuardOfAlgebraicStates {
-        /// The name of the function.
+        /// The event function.
         function: &'static str,
     },
-    /// The model or a function depends on time at an event, which second derivatives exclude; first
-    /// derivatives exclude it for event functions of algebraic states.
+    /// Second derivatives across an event require that neither the model nor the event functions
+    /// depend on the time; first ones across an event of algebraic states require it of the model.
     DependsOnTime {
-        /// The name of the model or function that depends on time.
+        /// What depends on the time.
         function: &'static str,
     },
-    /// The number of controls is not that of the intervals, or there is no interval.
+    /// The number of controls differs from the number of intervals, or there is no interval.
     Intervals {
-        /// The number of controls.
+        /// Number of controls.
         controls: usize,
-        /// The number of ends of intervals.
+        /// Number of ends of intervals.
         ends: usize,
     },
-    /// The nodes of the tableau do not define a polynomial through the stages: there is no dense
-    /// output, and there are no algebraic states at the ends of the interval.
+    /// The nodes of the tableau define no polynomial through the stages: dense output, and
+    /// algebraic states at the ends of the interval, are not available.
     NoInterpolation,
-    /// A query about the last successful call, without such a call.
+    /// The result of the last successful call was requested before any call succeeded.
     NoResult,
-    /// The end of an interval could not be projected onto the invariants of the model.
+    /// The final state could not be projected onto the invariants of the model.
     NotProjected {
-        /// The equation of the invariant with the largest violation.
+        /// Equation of the constraint with the largest violation.
         equation: u32,
-        /// The order of the derivative of this equation that is the invariant.
+        /// Order of the derivative of the constraint.
         derivative: u32,
-        /// The violation.
+        /// The largest violation.
         residual: f64,
     },
     /// The memory of a mode could not be allocated.
     OutOfMemory {
-        /// The size; `usize::MAX` if it overflows.
+        /// Size of the memory; the maximum of `usize` if it overflows.
         bytes: usize,
     },
 }
@@ -280,7 +284,7 @@ impl From<TableauError> for Error {
     }
 }
 
-/// The reason of a step rejection.
+/// Why a step was rejected.
 ///
 /// ```
 /// # use casados::error::Refusal;
@@ -307,19 +311,19 @@ pub enum Refusal {
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
-    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
-    /// equations merge, and none exists beyond (a fold).
+    /// `∂f/∂(ẋ, z)` becomes singular at the end of the last step: two solutions of the algebraic
+    /// equations meet and end there (fold).
     SingularAlgebraic {
-        /// The algebraic state in the kernel of `∂f/∂z`.
+        /// The algebraic state along which the matrix becomes singular.
         unknown: &'static str,
     },
-    /// The model returned an infinite value or NaN, or the numbers overflowed.
+    /// The model returned an infinite value or NaN, or numbers overflowed.
     NotFinite,
-    /// The interval is shorter than the resolution of the time.
+    /// The interval is shorter than the spacing of floating-point numbers at the time.
     Resolution,
 }
 
-/// An algebraic state and its initial guess.
+/// An algebraic state, and its start value in Newton's method.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -340,13 +344,13 @@ pub enum Refusal {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Started {
-    /// The name of the state.
+    /// Name of the state.
     pub unknown: &'static str,
-    /// The initial guess.
+    /// Its start value.
     pub value: f64,
 }
 
-/// The equation and the unknown for which Newton's method fails at every step size.
+/// The equation and the unknown that do not settle, if Newton's method converges for no step size.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -365,15 +369,16 @@ pub struct Started {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Unsettled {
-    /// The equation with the largest residual relative to its terms at the last iterate.
+    /// The equation with the largest residual relative to its terms, at the end of the last
+    /// iteration.
     pub equation: usize,
-    /// This relative residual.
+    /// Residual of this equation, relative to its terms.
     pub residual: f64,
-    /// The unknown with the largest last increment relative to its tolerance: the state whose
-    /// derivative it is, or the algebraic state.
+    /// The unknown with the largest last increment relative to its tolerance: an algebraic state,
+    /// or the state of a derivative.
     pub unknown: &'static str,
-    /// The value of this state at the reached time.
+    /// Value of this state at the time that was reached.
     pub value: f64,
-    /// Whether it is an algebraic state.
+    /// Whether the state is algebraic.
     pub algebraic: bool,
 }

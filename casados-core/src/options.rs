@@ -1,19 +1,19 @@
-//! Options of an integrator.
+//! Options of integrators.
 
 use crate::error::Error;
 
-/// Maximum tolerance of Newton's method: one correct digit.
+/// The largest relative tolerance: one correct digit.
 const MAX_RTOL: f64 = 0.1;
-/// Maximum number of iterations; Newton's method converges within a few dozen.
+/// The largest number of iterations; Newton's method converges within a few dozen, if at all.
 const MAX_ITERATIONS: usize = 10_000;
 
 /// Options of an integrator.
 ///
-/// The defaults are one step, and Newton's method to rounding. Later versions may add fields: write
-/// `..Default::default()`.
+/// The defaults are one step, and Newton's method to rounding. A later version may have more
+/// fields: write `..Default::default()`.
 ///
 /// # Errors
-/// Integrators return [`Error::InvalidOption`] for values out of range.
+/// Invalid values are [`Error::InvalidOption`] of the constructor of the integrator.
 ///
 /// # Example
 /// ```
@@ -33,16 +33,16 @@ const MAX_ITERATIONS: usize = 10_000;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Number of steps of equal size in one interval, at least one. Default 1.
+    /// Number of equal steps in an interval, at least one. Default 1.
     pub steps: usize,
-    /// Options of Newton's method for the stages of an implicit method; explicit methods ignore it.
+    /// Newton's method for the stages of an implicit method; explicit methods do not read it.
     /// Default: that of [`Newton`].
     pub newton: Newton,
-    /// Initial guess of Newton's method. Default [`Start::Nominal`].
+    /// The initial guess of Newton's method. Default [`Start::Nominal`].
     pub start: Start,
-    /// Whether the sum over the steps is compensated (Kahan summation), and implicit methods
-    /// compute the sums over their stages in double-double arithmetic: for thousands of steps in
-    /// one interval, in which rounding errors of `x` accumulate. Default false.
+    /// Whether sums over the steps are compensated (Kahan summation), and implicit methods compute
+    /// the sums of their stages with twice the digits: for thousands of steps in one interval,
+    /// where rounding errors of `x` accumulate. Default false.
     pub compensated: bool,
 }
 
@@ -55,7 +55,7 @@ impl Default for Options {
 
 /// Newton's method for the equations of the stages.
 ///
-/// Later versions may add fields: write `..Default::default()`.
+/// A later version may have more fields: write `..Default::default()`.
 ///
 /// ```
 /// use casados::options::Newton;
@@ -66,19 +66,19 @@ impl Default for Options {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// The iteration ends when its predicted error is below this tolerance, relative to the
-    /// magnitude of each unknown; for a derivative `ẋ` an error below the rounding of `x/h`, which
-    /// does not change `x`, is also accepted. Between zero and 0.1; the default zero means
-    /// rounding: a few units in the last place of the number type.
+    /// Tolerance of the iteration: it ends when its predicted error is below this, relative to the
+    /// size of each unknown; for a derivative `ẋ` an error below the rounding of `x/h`, which does
+    /// not change `x`, is also accepted. Between zero and 0.1; zero, the default, means rounding: a
+    /// few units in the last place of the number type.
     pub tolerance: f64,
-    /// Maximum number of iterations; more are the error `NotConverged`. Between 1 and 10000,
-    /// default 50. Ignored with `fixed_iterations`.
+    /// Maximal number of iterations with a tolerance; more are the error `NotConverged`. Between 1
+    /// and 10000; default 50.
     pub max_iterations: usize,
     /// The Jacobian of the iteration. Sensitivities always use the Jacobian at the solution.
     /// Default [`Jacobian::Auto`].
     pub jacobian: Jacobian,
-    /// A fixed number of iterations, between 1 and 10000, without a convergence test: the same run
-    /// time in every call. Default `None`: iterates until `tolerance` is met.
+    /// A fixed number of iterations, between 1 and 10000, without a convergence test: every call
+    /// has the same run time. Default `None`: iterations until convergence.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -88,7 +88,7 @@ impl Default for Newton {
     }
 }
 
-/// The update policy of the Jacobian in Newton's method.
+/// The Jacobian in Newton's method.
 ///
 /// ```
 /// use casados::options::{Jacobian, Newton};
@@ -98,28 +98,27 @@ impl Default for Newton {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Jacobian {
-    /// Reuses the Jacobian of the last step (in the first step, of the initial guess), and
-    /// evaluates and factorises a new one when the predicted iterations with the old one cost more.
-    /// The costs are the operation counts of the model's structure; the contraction rate is
-    /// measured by the increments or, after the first one, by the residual. With three stages or
-    /// more a new Jacobian is as `Simplified` up to three times in a step. With a fixed number of
-    /// iterations as `Full`.
+    /// The Jacobian of the initial guess in the first step, that of the last step in later ones;
+    /// updated as soon as the predicted iterations with it cost more than an update. The prediction
+    /// uses the operation counts of the model's structure and the contraction rate, or after the
+    /// first increment the residual. With three stages or more an update is `Simplified`, at most
+    /// three times in a step. With a fixed number of iterations as `Full`.
     #[default]
     Auto,
-    /// The average of the Jacobians at the stages, in the eigenbasis of the tableau; updated as
-    /// with `Auto`. As `Auto` for tableaux with one or two stages, or without such a basis.
+    /// The mean of the Jacobians of the stages, in the eigenbasis of the tableau (Butcher
+    /// transformation); updated as with `Auto`. Tableaux of one or two stages, or without such a
+    /// basis, use `Auto`.
     Simplified,
-    /// A new Jacobian and factorisation in every iteration: the exact Newton's method. Growing
-    /// increments, which are rejected with older Jacobians, are applied.
+    /// Evaluated and factorised in every iteration. Increments are not rejected for their growth,
+    /// as those with older Jacobians are: the iterates are those of Newton's method.
     Full,
-    /// One Jacobian and factorisation in each step, at the initial guess, and a second one only if
-    /// an increment is more than half of the preceding one. With a fixed number of iterations there
-    /// is no second one.
+    /// Evaluated and factorised once in each step, at the initial guess; updated only if increments
+    /// do not halve. (A fixed number of iterations has no updates.)
     Frozen,
 }
 
 impl Jacobian {
-    /// Whether factors are reused, and Jacobians averaged, while that costs less than new ones.
+    /// Whether old and shared Jacobians are used while they are cheaper than updates.
     pub(crate) fn is_adaptive(self) -> bool {
         matches!(self, Self::Auto | Self::Simplified)
     }
@@ -127,14 +126,14 @@ impl Jacobian {
 
 /// The initial guess of Newton's method in the first step of a call.
 ///
-/// Later steps start from the extrapolated polynomial of the preceding step; with five stages or
-/// more the algebraic states start from those of its last stage. A call thus stays on the branch of
-/// its first step.
+/// In later steps the initial guess is the polynomial through the stages of the preceding step;
+/// with five stages or more the algebraic states start at those of its last stage. So a call stays
+/// on the branch of its first step.
 ///
-/// If the equations have several roots, as `z² = x`, the initial guess selects one, and the result
-/// does not show which. State the expected value, `#[dae(nominal(z = 0.1))]`, or call `set_start`.
-/// Such values are also required if the residual is undefined at `z = 0`, as for `ln z`, or a
-/// matrix is singular there, as for `z² = x`.
+/// If the equations have several roots, as those of `z² = x`, the initial guess selects one, and an
+/// undesired root is not detected: declare the range of the model, `#[dae(nominal(z = 0.1))]`, or
+/// give values with `set_start`. If a residual has no value at `z = 0`, as that of `ln z`, or a
+/// matrix is singular there, as that of `z² = x`, such values are required.
 ///
 /// ```
 /// use casados::options::Start;
@@ -159,28 +158,28 @@ impl Jacobian {
 #[non_exhaustive]
 pub enum Start {
     /// The values of `set_start` if it was called, otherwise the nominal values of the model,
-    /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`; without one, at the geometric
-    /// mean of a `range(..)` that excludes zero; otherwise at zero. `ẋ` is zero, unless the
+    /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or without one at the geometric
+    /// mean of a `range(..)` that does not contain zero, otherwise at zero. `ẋ` is zero, unless the
     /// equations are nonlinear in it and it has a nominal value. Results are bitwise reproducible.
     #[default]
     Nominal,
-    /// `ẋ = 0` and `z = 0`; nominal values are ignored.
+    /// `ẋ = 0` and `z = 0`, independently of the nominal values.
     Zero,
     /// The values of `set_start`; an error if it was not called.
     Given,
-    /// Warm start: the stages of the same step in the last successful call; in the first call as
-    /// `Nominal`. All calls until `reset` stay on the same branch.
+    /// The stages of the same step in the last successful call; in the first call as `Nominal`. All
+    /// calls stay on the branch that was found first, until `reset`.
     Warm,
 }
 
 impl Options {
-    /// Lifted integrators: an optimal control problem iterates on the stages together with its own
-    /// variables. Each call takes one iteration from the stages of the last call (in the first one
-    /// from the nominal values). At convergence the stages agree with those of other options (R.
-    /// Quirynen, S. Gros, M. Diehl, "Lifted implicit integrators for direct optimal control", CDC
-    /// 2015). Before, the errors at the ends of intervals are quadratic in the last step of the
-    /// problem; derivatives are exact at the current stages. The problem may take more iterations:
-    /// measure both.
+    /// Returns options with lifted stages for an optimal control problem, which then solves their
+    /// equations too: each call makes one iteration, from the stages of the last one (in the first
+    /// call from the nominal values). Stages converge together with the iterates of the problem,
+    /// and at convergence agree with those of any other options (R. Quirynen, S. Gros, M. Diehl,
+    /// "Lifted implicit integrators for direct optimal control", CDC 2015). Until then, ends of
+    /// intervals have errors of second order in the last step; derivatives are exact at the present
+    /// stages. Measure whether it saves more than the additional iterations of the problem cost.
     ///
     /// ```
     /// # use casados_core::options::{Options, Start};
@@ -193,8 +192,10 @@ impl Options {
         Self { newton, start: Start::Warm, ..self }
     }
 
+    /// Checks the options.
+    ///
     /// # Errors
-    /// [`Error::InvalidOption`] for the first value out of range.
+    /// [`Error::InvalidOption`] for the first invalid value.
     pub fn check(&self) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
         if self.steps == 0 {

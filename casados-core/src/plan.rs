@@ -1,43 +1,43 @@
 //! The structure of a model for kernels, bound at compile time or at run time.
 //!
-//! | plan | kernels are compiled | loops over tables | lengths |
+//! | | kernels are compiled | loops over tables | lengths |
 //! | --- | --- | --- | --- |
 //! | [`Known<M>`](Known) | for each model | unrolled if short | constants |
 //! | [`&'static ModelTable`](ModelTable) | once for all models | loops | read |
 //!
-//! A kernel is generic over its plan and takes it as a value, which has size zero for a known
-//! model. Compile-time decisions use [`Plan::KNOWN_STRUCTURE`].
+//! A kernel is generic over its plan and has it as a value, which has no size if the model is known
+//! at compile time. Decisions that need constants use [`Plan::KNOWN_STRUCTURE`].
 
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::shape::{Plain, Shape};
 use crate::structure::{Kinematic, Structure};
 use core::marker::PhantomData;
 
-/// Storage of a fixed number of elements: an array for a known model, otherwise a slice.
+/// An array if the model is known at compile time, otherwise a slice.
 pub trait Elements<T>: AsRef<[T]> + AsMut<[T]> {}
 impl<T, A: AsRef<[T]> + AsMut<[T]> + ?Sized> Elements<T> for A {}
 
 /// The plan of a kernel.
 pub trait Plan: Copy + Send + Sync + 'static {
-    /// The structure of the model, if kernels are compiled for it.
+    /// The structure of the model, if kernels are compiled for one model.
     const KNOWN_STRUCTURE: Option<&'static Structure>;
-    /// The number of columns in memory for directions that are computed together, if known.
+    /// Number of columns of the memory for directions, if it is known.
     const NC: usize;
 
-    /// One element for each differential state.
+    /// One element per differential state.
     type X<T: Plain>: Elements<T> + ?Sized;
-    /// One element for each unknown of a stage, or for each equation.
+    /// One element per unknown of a stage, or per equation.
     type K<T: Plain>: Elements<T> + ?Sized;
-    /// One element for each variable.
+    /// One element per variable.
     type V<T: Plain>: Elements<T> + ?Sized;
-    /// One element for each entry of the Jacobian.
+    /// One element per entry of the Jacobian.
     type Jacobian<T: Plain>: Elements<T> + ?Sized;
-    /// One element for each block of the factors.
+    /// One element per block of the factors.
     type Factors<T: Plain>: Elements<T> + ?Sized;
 
-    /// The structure of the model.
+    /// Returns the structure of the model.
     fn structure(self) -> &'static Structure;
-    /// Facts derived from the structure.
+    /// Returns the facts derived from the structure.
     fn facts(self) -> &'static DerivedFacts;
 
     /// The number of differential states.
@@ -71,7 +71,7 @@ pub trait Plan: Copy + Send + Sync + 'static {
         self.nx() + self.nu() + self.structure().p.len()
     }
 
-    /// The row of right-hand sides that belongs to an equation: that of its pivot unknown.
+    /// Returns the row of an equation in right-hand sides: that of the unknown whose pivot it is.
     #[inline(always)]
     fn slot(self, equation: usize) -> usize {
         match self.structure().elimination.slot_of_equation.get(equation) {
@@ -80,20 +80,20 @@ pub trait Plan: Copy + Send + Sync + 'static {
         }
     }
 
-    /// The description of the [kinematic](Kinematic) state in a slot, if it is one.
+    /// Returns the kinematic state of a slot, if it is [kinematic](Kinematic).
     #[inline(always)]
     fn kinematic(self, slot: usize) -> Option<&'static Kinematic> {
         kinematic(self.structure(), slot)
     }
 
-    /// The index of the state that is the velocity of a kinematic state, if it is a state.
+    /// Returns the unknown of the velocity of a kinematic state, if the velocity is a state.
     #[inline(always)]
     fn velocity(self, of: &Kinematic) -> Option<usize> {
         let (nx, velocity) = (self.nx(), of.velocity as usize);
         if velocity < 2 * nx { velocity.checked_sub(nx) } else { None }
     }
 
-    /// An entry of a Jacobian: row, column, value.
+    /// Returns an entry of a Jacobian: row, column, value.
     #[inline(always)]
     fn entry<V>(self, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
         let pattern = &self.structure().jacobian;
@@ -103,25 +103,25 @@ pub trait Plan: Copy + Send + Sync + 'static {
     }
 }
 
-/// The plan of a model, with conversions from its arrays.
+/// A plan of this model, with conversions from the arrays of the model.
 pub trait PlanOf<M: Dae>: Plan {
-    /// One element for each differential state.
+    /// One element per differential state.
     fn x<T: Plain>(of: &ArrayX<M, T>) -> &Self::X<T>;
-    /// One element for each unknown of a stage, or for each equation.
+    /// One element per unknown of a stage, or per equation.
     fn k<T: Plain>(of: &ArrayK<M, T>) -> &Self::K<T>;
-    /// Mutable version of [`PlanOf::k`].
+    /// One element per unknown of a stage, or per equation.
     fn k_mut<T: Plain>(of: &mut ArrayK<M, T>) -> &mut Self::K<T>;
-    /// One element for each variable.
+    /// One element per variable.
     fn v<T: Plain>(of: &ArrayV<M, T>) -> &Self::V<T>;
-    /// Mutable version of [`PlanOf::v`].
+    /// One element per variable.
     fn v_mut<T: Plain>(of: &mut ArrayV<M, T>) -> &mut Self::V<T>;
-    /// One element for each entry of the Jacobian.
+    /// One element per entry of the Jacobian.
     fn jacobian<T: Plain>(of: &M::Jacobian<T>) -> &Self::Jacobian<T>;
-    /// One element for each block of the factors.
+    /// One element per block of the factors.
     fn factors_mut<T: Plain>(of: &mut M::Factors<T>) -> &mut Self::Factors<T>;
 }
 
-/// Converts the arrays of a model to those of a plan.
+/// Converts arrays of a model to those of a plan.
 macro_rules! arrays {
     ($M:ident: $of:ident => $as_ref:expr, $as_mut:expr) => {
         #[inline(always)]
@@ -155,11 +155,11 @@ macro_rules! arrays {
     };
 }
 
-/// The plan of a model that is known when kernels are compiled.
+/// The plan of a model that is known at compile time.
 pub struct Known<M>(PhantomData<fn() -> M>);
 
 impl<M> Known<M> {
-    /// The only value.
+    /// Its only value.
     pub const PLAN: Self = Self(PhantomData);
 }
 
@@ -173,7 +173,7 @@ impl<M> Copy for Known<M> {}
 
 impl<M: Dae> Plan for Known<M> {
     const KNOWN_STRUCTURE: Option<&'static Structure> = Some(&M::STRUCTURE);
-    // The number of columns in the rows of `ArrayC`.
+    // The length of the rows of `ArrayC`.
     const NC: usize = if cfg!(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
         M::Shape::NC
     } else {
@@ -206,7 +206,7 @@ pub struct ModelTable {
 }
 
 impl ModelTable {
-    /// The plan of a model.
+    /// Returns the table of a model.
     pub const fn of(structure: &'static Structure) -> Self {
         Self { structure, facts: DerivedFacts::of(structure) }
     }
@@ -234,7 +234,7 @@ impl<M: Dae> PlanOf<M> for &'static ModelTable {
     arrays!(M: of => of.as_ref(), of.as_mut());
 }
 
-/// The description of the [kinematic](Kinematic) state in a slot, if it is one.
+/// Returns the kinematic state of a slot, if it is [kinematic](Kinematic).
 #[inline(always)]
 pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Kinematic> {
     let kinematic = structure.elimination.kinematic;
@@ -248,20 +248,20 @@ pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Ki
 /// Facts derived from a structure at compile time.
 #[derive(Debug)]
 pub struct DerivedFacts {
-    /// The range of the unknowns from the first to the last that is not kinematic: `(first, end)`.
+    /// The range `(first, end)` of unknowns without the kinematic states before the first and after
+    /// the last other unknown.
     pub non_kinematic_range: (usize, usize),
-    /// The number of terms of the Newton matrix that are fill.
+    /// Number of assembly terms that are fill-in.
     pub fill_terms: usize,
-    /// The numbers of nonlinear variables before the first state, and before the first algebraic
-    /// state.
+    /// Numbers of nonlinear variables before the first state, and before the first algebraic state.
     pub nonlinear_before: [usize; 2],
-    /// Whether each equation with a derivative contains that of one state, in the order of the
-    /// states: the entries of `f_ẋ` are then those of the states.
+    /// Whether each equation with a derivative has that of one state, in the order of the states:
+    /// the entries of `f_ẋ` are then in this order.
     pub has_direct_rates: bool,
 }
 
 impl DerivedFacts {
-    /// The facts of a structure.
+    /// Derives the facts of a structure.
     pub const fn of(structure: &Structure) -> Self {
         let nx = structure.x.len();
         Self {
@@ -273,8 +273,8 @@ impl DerivedFacts {
     }
 }
 
-/// The number of elements before `number` in an ascending list: of influential directions, or of
-/// nonlinear variables.
+/// Returns how many elements of an ascending list (directions with influence, nonlinear variables)
+/// are less than `number`.
 pub const fn count_before(numbers: &[u32], number: usize) -> usize {
     let mut count = 0;
     while count < numbers.len() && (numbers[count] as usize) < number {
@@ -294,7 +294,7 @@ const fn non_kinematic_range(structure: &Structure) -> (usize, usize) {
     (first, end)
 }
 
-/// See [`DerivedFacts`].
+/// See [`DerivedFacts::has_direct_rates`].
 pub const fn has_direct_rates(structure: &Structure) -> bool {
     let (count, pattern) = (structure.blocks[1], &structure.jacobian);
     let mut entry = 0;
@@ -307,20 +307,20 @@ pub const fn has_direct_rates(structure: &Structure) -> bool {
     count == structure.x.len()
 }
 
-/// A table of the structure, which kernels traverse row by row.
+/// A table of the structure that kernels process row by row.
 #[derive(Clone, Copy)]
 pub enum StructureTable {
-    /// The terms of the Newton matrix, fill first.
+    /// The terms of the Newton matrix, fill-in first.
     Assembly,
-    /// The terms that are fill.
+    /// The terms that are fill-in.
     Fill,
-    /// The entries of equations with respect to kinematic states.
+    /// Entries by which equations depend on kinematic states.
     Dependents,
-    /// The states up to the last kinematic one.
+    /// States up to the last kinematic one.
     Kinematic,
-    /// The unknowns of a stage.
+    /// Unknowns of a stage.
     Unknowns,
-    /// The entries of the Jacobian from the start of a block to that of another.
+    /// Entries of the Jacobian from the start of a block to the start of another.
     Entries(usize, usize),
 }
 
@@ -328,7 +328,7 @@ impl StructureTable {
     /// All entries of the Jacobian.
     pub const JACOBIAN: Self = Self::Entries(0, 5);
 
-    /// The number of rows.
+    /// Returns the number of rows.
     #[inline(always)]
     pub const fn row_count(self, structure: &Structure) -> usize {
         let Structure { elimination, blocks, x, z, .. } = structure;
@@ -342,7 +342,7 @@ impl StructureTable {
         }
     }
 
-    /// The number of rows, if kernels are compiled for one model.
+    /// Returns the number of rows, if kernels are compiled for one model.
     pub const fn known_row_count<P: Plan>(self) -> Option<usize> {
         match P::KNOWN_STRUCTURE {
             Some(structure) => Some(self.row_count(structure)),

@@ -5,12 +5,12 @@ use crate::shape::Matrix;
 use bytemuck::Zeroable;
 use nalgebra::SMatrix;
 
-/// A struct that is an argument of a model, as numbers in the order of the model: implemented by
-/// `#[derive(Record)]`.
+/// A struct that is an argument of a model, converted to numbers in the order of the model;
+/// implemented by `#[derive(Record)]`.
 ///
-/// Fields have the types of arguments: `f64`, arrays, tuples, fixed-size nalgebra vectors and
-/// matrices, and other records. The order is that of `STRUCTURE`: fields as declared, arrays by
-/// index, matrices in column-major order.
+/// Fields are of the types of arguments: `f64`, arrays, tuples, fixed-size nalgebra vectors and
+/// matrices, and other records. The order is that of `STRUCTURE`: fields in the order of their
+/// declaration, elements of arrays by index, matrices in column-major order.
 ///
 /// # Example
 /// ```
@@ -39,17 +39,16 @@ use nalgebra::SMatrix;
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub trait Record: Sized {
-    /// The number of numbers.
+    /// Number of numbers.
     const NUMBERS: usize;
 
-    /// Passes the numbers to `to`, in order.
+    /// Writes the numbers in order.
     fn write(&self, to: &mut dyn FnMut(f64));
 
-    /// Builds the struct from numbers, in order.
+    /// Reads the numbers in order.
     fn read(from: &mut dyn FnMut() -> f64) -> Self;
 
-    /// Converts to a vector: `x0`, `u` or `p` of an integrator. Another length is a compile-time
-    /// error.
+    /// Returns a vector: `x0`, `u` or `p` of an integrator. A wrong length is a compile-time error.
     #[must_use]
     fn to_vector<T: Real, V: Matrix<T>>(&self) -> V {
         const { assert!(Self::NUMBERS == V::ROWS * V::COLUMNS, "the record has as many numbers as the vector") };
@@ -63,20 +62,20 @@ pub trait Record: Sized {
         vector
     }
 
-    /// Converts from a vector: a result of an integrator. Another length is a compile-time error.
+    /// Converts a vector: a result of an integrator. A wrong length is a compile-time error.
     #[must_use]
     fn from_vector<T: Real, V: Matrix<T>>(vector: &V) -> Self {
         const { assert!(Self::NUMBERS == V::ROWS * V::COLUMNS, "the record has as many numbers as the vector") };
         record_from_slice(vector.as_slice())
     }
 
-    /// Converts from a slice: a stage of a solution. `None` for another length.
+    /// Converts a slice: a stage of a solution. `None` if the length is wrong.
     #[must_use]
     fn from_slice<T: Real>(values: &[T]) -> Option<Self> {
         (values.len() == Self::NUMBERS).then(|| record_from_slice(values))
     }
 
-    /// The numbers, in order.
+    /// Returns the numbers in order.
     #[cfg(feature = "alloc")]
     #[must_use]
     fn numbers(&self) -> alloc::vec::Vec<f64> {
@@ -145,7 +144,7 @@ mod tests {
 
     type Nested = (f64, [Vector2<f64>; 2], Matrix2<f64>, (Vector1<f64>, [f64; 0]));
 
-    /// The numbers are integers, each equal to its index.
+    /// Each number is its position.
     #[test]
     fn order_of_numbers() {
         let value: Nested = (

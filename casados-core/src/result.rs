@@ -1,7 +1,7 @@
-//! Results of integrators: nalgebra vectors and matrices of the model's dimensions.
+//! The results of integrators: nalgebra vectors and matrices of the model's dimensions.
 //!
-//! Every result contains the results of simpler calls and dereferences to them: `forward.x` is the
-//! end state, and `hessian.dx_du` the Jacobian of the same call.
+//! Every result contains the smaller ones and dereferences to them: `forward.x` is the final state
+//! and `hessian.dx_du` the Jacobian of the same call.
 
 use crate::model::{
     Dae, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX, MatrixZC,
@@ -78,7 +78,7 @@ pub struct Forward<M: Dae, T: Plain = f64> {
     pub dz0_dp: MatrixZP<M, T>,
 }
 
-/// The solution and its directional derivatives in `C` directions.
+/// The solution and its derivatives in `C` directions.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -108,8 +108,7 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
     pub dz0: MatrixZC<M, T, C>,
 }
 
-/// `C` directions `(δx₀, δu, δp)`, one in each column: the argument of `directional`. The default
-/// is zero.
+/// `C` directions `(δx₀, δu, δp)`, one per column: the argument of `directional`. Zero by default.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -138,7 +137,7 @@ pub struct Seeds<M: Dae, T: Plain, const C: usize> {
     pub p: MatrixPC<M, T, C>,
 }
 
-/// The solution and the gradients of `λᵀx` for `C` seeds `λ`, one in each column.
+/// The solution and the gradients of `λᵀx` for `C` seeds `λ`, one per column.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -196,11 +195,11 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
     pub grad_p: VectorP<M, T>,
 }
 
-/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`; of `λᵀx + νᵀz0` with
+/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`, or of `λᵀx + νᵀz0` with
 /// weights `ν`.
 ///
-/// The Hessian with respect to `(x₀, u, p)` is exactly symmetric; of its off-diagonal blocks the
-/// upper ones are given.
+/// The Hessian over `(x₀, u, p)` is bitwise symmetric; of its off-diagonal blocks the upper ones
+/// are stored.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -235,7 +234,7 @@ pub struct Hessian<M: Dae, T: Plain = f64> {
     pub h_pp: MatrixPP<M, T>,
 }
 
-/// The solution at a time within the interval.
+/// The solution at a time inside the interval.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -260,7 +259,7 @@ pub struct Dense<M: Dae, T: Plain = f64> {
     pub z: VectorZ<M, T>,
 }
 
-/// The solution at a time within the interval, and its derivatives.
+/// The solution at a time inside the interval, and its derivatives.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -305,7 +304,7 @@ plain!([M: Dae, T: Plain] Hessian<M, T> { first, h_xx, h_xu, h_uu, h_xp, h_up, h
 plain!([M: Dae, T: Plain] Dense<M, T> { x, z });
 plain!([M: Dae, T: Plain] DenseForward<M, T> { dense, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
 
-/// The zero of a result type.
+/// A result of zeros.
 macro_rules! zeros {
     ($($type:ident)*) => { $(
         impl<M: Dae, T: Plain> Default for $type<M, T> {
@@ -323,14 +322,14 @@ impl<M: Dae, T: Plain, const C: usize> Default for Adjoint<M, T, C> {
     }
 }
 
-/// Zero; the caller sets the seeds.
+/// Zero directions; set the seeds that are needed.
 impl<M: Dae, T: Plain, const C: usize> Default for Seeds<M, T, C> {
     fn default() -> Self {
         Self::zeroed()
     }
 }
 
-/// Dereferences a result to the simpler one that it contains.
+/// Dereferences a result to a smaller one that it contains.
 macro_rules! contains {
     ($outer:ident.$field:ident: $inner:ident, $($generics:tt)*) => {
         contains!(@ [$($generics)*] $outer $field $inner);
@@ -385,7 +384,7 @@ fn write_matrix_row<'a, T: Plain, A: Matrix<T>>(
     }
 }
 
-/// Writes a block on the diagonal from its lower triangle.
+/// Writes a diagonal block from its lower triangle.
 pub(crate) fn write_symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(
     block: &mut A,
     lower: &[R],

@@ -1,4 +1,4 @@
-//! Statistics of the last call.
+//! Statistics of calls.
 
 /// Statistics of the last call, successful or not.
 ///
@@ -20,18 +20,20 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// Completed steps.
+    /// Number of completed steps.
     pub steps: usize,
-    /// Iterations of Newton's method, summed over all steps.
+    /// Number of Newton iterations in all steps.
     pub iterations: usize,
-    /// Evaluations of the residual at all stages; for explicit methods, at one stage.
+    /// Number of evaluations of the residual alone at all stages; for explicit methods at one
+    /// stage.
     pub residuals: usize,
-    /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the
-    /// Jacobian in their middle; for explicit methods, at one stage.
+    /// Number of evaluations of the residual and the Jacobian at all stages, or of the residual at
+    /// all stages and the Jacobian at their midpoint; for explicit methods at one stage.
     pub jacobians: usize,
-    /// Factorisations of the Newton matrix.
+    /// Number of factorisations of the Newton matrix.
     pub factorizations: usize,
-    /// Factorisations with the dense fallback, since the planned elimination lost too many digits.
+    /// Number of these factorisations with pivoting of the whole matrix, since the planned
+    /// elimination was too inaccurate.
     pub dense: usize,
 }
 

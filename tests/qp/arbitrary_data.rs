@@ -5,7 +5,7 @@
 
 use crate::Test;
 use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, numbers, problem};
-use crate::runs::{Counts, seeds, shows};
+use crate::runs::{Counts, prints_verdicts, seeds};
 use casados::qp::{
     Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPointOptions, QpError, QpSolver,
     QpStart, QpStatistics, Residuals, StageMut, residuals,
@@ -179,8 +179,8 @@ impl VerdictCounts {
                 assert!(residual <= 10.0 * allowed, "{seed}: {residual:e} {allowed:e} {statistics:?}");
             }
         }
-        self.counts.result(&found);
-        if shows() && found.is_err() {
+        self.counts.count_result(&found);
+        if prints_verdicts() && found.is_err() {
             println!("{} {seed}: {found:?}", self.counts);
         }
         found
@@ -216,7 +216,7 @@ fn arbitrary_problems() -> Test {
         let _ = class.solve(seed, &qp, start, &mut solution);
     }
     println!("{}", class.counts);
-    assert!(class.counts.of("Ok") > 0 && class.counts.of("InvalidValue") > 0, "{}", class.counts);
+    assert!(class.counts.count_of("Ok") > 0 && class.counts.count_of("InvalidValue") > 0, "{}", class.counts);
     Ok(())
 }
 
@@ -256,6 +256,6 @@ fn huge_and_tiny_data() -> Test {
         assert!(is_true, "{seed}: {found:?}");
     }
     println!("{}", class.counts);
-    assert!(class.counts.of("Ok") > class.counts.all() / 4, "{}", class.counts);
+    assert!(class.counts.count_of("Ok") > class.counts.all() / 4, "{}", class.counts);
     Ok(())
 }

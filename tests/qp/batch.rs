@@ -48,7 +48,7 @@ fn batches_and_single_solves() -> Test {
                 let QpInstance { qp, solution } = instance;
                 let found = HeapInteriorPoint::new().solve(qp.view(), start, solution.view_mut());
                 assert_eq!(format!("{status:?}"), format!("{found:?}"));
-                counts.result(&found);
+                counts.count_result(&found);
             }
             for (together, alone) in all.iter().zip(&alone) {
                 let pairs = numbers(&together.solution).zip(numbers(&alone.solution));
@@ -57,7 +57,10 @@ fn batches_and_single_solves() -> Test {
         }
     }
     println!("{counts}");
-    assert!(counts.of("Infeasible") > 0 && counts.of("InvalidValue") > 0 && counts.of("Ok") > 0, "{counts}");
+    assert!(
+        counts.count_of("Infeasible") > 0 && counts.count_of("InvalidValue") > 0 && counts.count_of("Ok") > 0,
+        "{counts}"
+    );
     assert!(batch.solve(&mut [], QpStart::Cold)?.is_empty());
     Ok(())
 }

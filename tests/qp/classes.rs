@@ -6,7 +6,7 @@ use crate::Test;
 use crate::known_solutions::{
     HessianKind, KnownProblem, Numbers, PLAIN, ProblemKind, invalid_numbers, numbers, problem,
 };
-use crate::runs::{Counts, kind, seeds, shows};
+use crate::runs::{Counts, error_kind, prints_verdicts, seeds};
 use casados::qp::{
     Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart,
     QpStatistics, SolutionStage, Stage, StageDims, StageMut, residuals,
@@ -46,9 +46,9 @@ impl VerdictCounts {
         match found {
             Ok(None) => self.counts.count("Ok"),
             Ok(Some(_)) => self.counts.count("wrong"),
-            Err(error) => self.counts.count(&kind(error)),
+            Err(error) => self.counts.count(&error_kind(&error)),
         }
-        if shows() && !matches!(found, Ok(None)) {
+        if prints_verdicts() && !matches!(found, Ok(None)) {
             println!("{}, {seed}: {found:?}", self.counts);
         }
     }
@@ -58,10 +58,10 @@ impl VerdictCounts {
         1000 * self.gave_up() <= most * self.counts.all().max(1000)
     }
     fn gave_up(&self) -> u64 {
-        self.counts.among(&["MaxIterations", "Stalled"])
+        self.counts.count_of_any(&["MaxIterations", "Stalled"])
     }
     fn false_verdicts(&self) -> u64 {
-        self.counts.all() - self.counts.of("Ok") - self.gave_up()
+        self.counts.all() - self.counts.count_of("Ok") - self.gave_up()
     }
 }
 
@@ -151,10 +151,10 @@ fn run_class(name: &str, kind: &ProblemKind, few: u64, start: QpStart) -> Result
 #[test]
 fn strictly_convex() -> Test {
     let class = run_class("strictly convex", &PLAIN, 300, QpStart::Cold)?;
-    assert_eq!(class.counts.of("Ok"), class.counts.all());
+    assert_eq!(class.counts.count_of("Ok"), class.counts.all());
     let kind = ProblemKind { empty: true, ..PLAIN };
     let class = run_class("strictly convex with empty stages", &kind, 300, QpStart::Cold)?;
-    assert_eq!(class.counts.of("Ok"), class.counts.all());
+    assert_eq!(class.counts.count_of("Ok"), class.counts.all());
     Ok(())
 }
 
@@ -243,7 +243,7 @@ fn infeasible() -> Test {
             assert!(violation >= distance / (1e2 * qp.dims()[stage].ng as f64), "{seed}: {violation:e}");
         }
         println!("{}", class.counts);
-        let (all, true_ones) = (class.counts.all(), class.counts.of("Infeasible"));
+        let (all, true_ones) = (class.counts.all(), class.counts.count_of("Infeasible"));
         assert!(all > 0 && true_ones + class.gave_up() == all && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
@@ -357,8 +357,8 @@ fn nonconvex_problems() -> Test {
         class.count(seed, &found.map(|_| None));
     }
     println!("{}", class.counts);
-    let said = class.counts.of("NotConvex");
-    let known = said + class.counts.of("Ok") + class.gave_up();
+    let said = class.counts.count_of("NotConvex");
+    let known = said + class.counts.count_of("Ok") + class.gave_up();
     assert!(said > 0 && convex > 0 && known == class.counts.all(), "{}", class.counts);
     Ok(())
 }

@@ -3,7 +3,7 @@
 
 use crate::Test;
 use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, problem};
-use crate::runs::{shows, times};
+use crate::runs::{case_multiplier, prints_verdicts};
 use casados::qp::{Clarabel, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, residuals};
 
 const TOLERANCE: f64 = 1e-8;
@@ -100,7 +100,7 @@ fn check_iteration_limit() -> Test {
 /// Iterations are what the solver asks the clock for: errors have no number of them.
 fn check_verdicts(name: &str, kind: &ProblemKind) -> Test {
     let (mut feasible, mut infeasible, mut given_up) = (Vec::new(), Vec::new(), 0);
-    let count = 500 * times() as usize;
+    let count = 500 * case_multiplier() as usize;
     let mut seed = 0;
     while feasible.len() < count || infeasible.len() < count {
         seed += 1;
@@ -118,7 +118,7 @@ fn check_verdicts(name: &str, kind: &ProblemKind) -> Test {
         };
         let found =
             HeapInteriorPoint::new().solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over);
-        if shows() {
+        if prints_verdicts() {
             println!("{name}, {seed}: {asked} {oracle:?} {found:?}");
         }
         match (oracle, found) {
@@ -140,7 +140,7 @@ fn check_verdicts(name: &str, kind: &ProblemKind) -> Test {
     }
     println!("| {name} | feasible | {} |", quantiles(feasible));
     println!("| {name} | infeasible | {} |", quantiles(infeasible));
-    assert!(given_up <= 2 * times(), "{given_up}");
+    assert!(given_up <= 2 * case_multiplier(), "{given_up}");
     Ok(())
 }
 

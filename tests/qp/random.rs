@@ -5,7 +5,7 @@
 //! reached, and so does a solver that never saw another problem.
 
 use crate::known_solutions::{Numbers, numbers};
-use crate::runs::{Counts, seeds, shows};
+use crate::runs::{Counts, prints_verdicts, seeds};
 use crate::{Test, solve_to};
 use casados::qp::{
     Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, QpStatistics,
@@ -100,8 +100,8 @@ fn dims(seed: u64) -> Vec<StageDims> {
 }
 
 fn solve_and_count(counts: &mut Counts, seed: u64, found: &Result<QpStatistics, QpError>) {
-    counts.result(found);
-    if shows() && found.is_err() {
+    counts.count_result(found);
+    if prints_verdicts() && found.is_err() {
         println!("{counts} {seed}: {found:?}");
     }
 }
@@ -144,8 +144,8 @@ fn assert_same_minimum(a: f64, b: f64, solution: &HeapSolution<f64>) -> bool {
 /// No verdict is false, and no more than one problem in a thousand is given up that has a solution.
 fn assert_verdicts(counts: &Counts, unbounded: u64) {
     println!("{counts}");
-    let given_up = counts.among(&["Stalled", "MaxIterations"]);
-    assert_eq!(counts.of("Ok") + given_up, counts.all(), "{counts}");
+    let given_up = counts.count_of_any(&["Stalled", "MaxIterations"]);
+    assert_eq!(counts.count_of("Ok") + given_up, counts.all(), "{counts}");
     assert!(1000 * (given_up - unbounded) <= counts.all().max(1000), "{counts}");
 }
 

@@ -133,7 +133,7 @@ fn verdicts_of_batches() -> Test {
             for ((status, together), instance) in statuses.iter().zip(&all).zip(&mut alone) {
                 let QpInstance { qp, solution } = instance;
                 let found = single.solve(qp.view(), start, solution.view_mut());
-                counts.result(&found);
+                counts.count_result(&found);
                 let (Ok(statistics), Ok(_)) = (status, &found) else {
                     let verdict =
                         |result: &Result<_, QpError>| result.as_ref().err().map(std::mem::discriminant);
@@ -156,7 +156,7 @@ fn verdicts_of_batches() -> Test {
     // A single solve tries one set only before it is an interior point.
     assert!(sets > 1, "problems were solved together");
     for verdict in ["Ok", "NotConvex", "InvalidValue", "CrossedBounds"] {
-        assert!(counts.of(verdict) > 0, "{counts}");
+        assert!(counts.count_of(verdict) > 0, "{counts}");
     }
     Ok(())
 }

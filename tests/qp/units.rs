@@ -3,7 +3,7 @@
 //! by `residuals`.
 
 use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, problem};
-use crate::runs::{Counts, kind, seeds, shows};
+use crate::runs::{Counts, error_kind, prints_verdicts, seeds};
 use crate::{Test, coupling};
 use casados::qp::{
     Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, SolutionStage,
@@ -219,19 +219,19 @@ fn check_in_all_units(
                     continue;
                 }
                 Err(error) => {
-                    counts.count(&kind(&error));
+                    counts.count(&error_kind(&error));
                     format!("{error}")
                 }
             };
-            if shows() {
+            if prints_verdicts() {
                 println!("{seed}: {found}");
             }
         }
         println!("{counts} {differences:?} {between:?}");
         solved &= few_unsolved > 0 || between.keys().all(|more| more.abs() <= 3);
-        let others_found = counts.of("other iterations");
-        let unsolved = counts.among(&["MaxIterations", "Stalled"]);
-        solved &= counts.of("Ok") + others_found + unsolved == counts.all();
+        let others_found = counts.count_of("other iterations");
+        let unsolved = counts.count_of_any(&["MaxIterations", "Stalled"]);
+        solved &= counts.count_of("Ok") + others_found + unsolved == counts.all();
         solved &= 100 * others_found <= others * counts.all().max(100);
         solved &= 1000 * unsolved <= few_unsolved * counts.all().max(1000);
     }

@@ -3,35 +3,35 @@
 //! their bits, Gauss methods keep quadratic invariants.
 
 use super::everything::Everything;
-use super::interval::{check, options};
+use super::interval::{check_interval, options};
 use casados::{Erk, Gauss, Heap, Integrator, Irk, RadauIIA, Rk4, ode};
 use nalgebra::SVector;
 
 #[test]
 fn implicit_model_with_everything() {
     let (x0, u, p) = (SVector::from([0.4, -0.7]), SVector::from([0.6]), SVector::from([1.3, 2.1]));
-    check::<Everything, _, 2, 1, 2>(
+    check_interval::<Everything, _, 2, 1, 2>(
         Irk::<Everything, Gauss<3>>::new(options(2)).expect("valid"),
         &x0,
         &u,
         &p,
         0.3,
     );
-    check::<Everything, _, 2, 1, 2>(
+    check_interval::<Everything, _, 2, 1, 2>(
         Irk::<Everything, Gauss<1>>::new(options(1)).expect("valid"),
         &x0,
         &u,
         &p,
         0.3,
     );
-    check::<Everything, _, 2, 1, 2>(
+    check_interval::<Everything, _, 2, 1, 2>(
         Irk::<Everything, RadauIIA<1>>::new(options(3)).expect("valid"),
         &x0,
         &u,
         &p,
         0.3,
     );
-    check::<Everything, _, 2, 1, 2>(
+    check_interval::<Everything, _, 2, 1, 2>(
         Irk::<Everything, RadauIIA<5>>::new(options(1)).expect("valid"),
         &x0,
         &u,

@@ -282,7 +282,7 @@ macro_rules! runs {
                         irk.set_start(&zero, &z).unwrap();
                         let step = irk.solve(&x0, &none, $steps as f64 * H);
                         take($index, step.ok().map(|step| {
-                            self.is_there(&step.z0.as_slice()[2..]) && self.is_there(&step.z.as_slice()[2..])
+                            self.is_at_solution(&step.z0.as_slice()[2..]) && self.is_at_solution(&step.z.as_slice()[2..])
                         }));
                     };
                 }
@@ -301,12 +301,12 @@ macro_rules! runs {
                 let mut results = [casados::result::Nominal::default(); 4];
                 let intervals = Intervals { x0: &states, p: &parameters, h: &[H], ..Default::default() };
                 let solved = batch.solve(&intervals, &mut results).is_ok();
-                take(6, solved.then(|| self.is_there(&results[2].z0.as_slice()[2..])));
+                take(6, solved.then(|| self.is_at_solution(&results[2].z0.as_slice()[2..])));
                 let mut radau = Adaptive::<M, Radau>::new(AdaptiveOptions::default()).unwrap();
                 radau.set_parameters(&p).unwrap();
                 radau.set_start(&zero, &z).unwrap();
                 let step = radau.solve(&x0, &none, H);
-                let ends = step.ok().map(|step| [step.z0, step.z].map(|z| self.is_there(&z.as_slice()[2..])));
+                let ends = step.ok().map(|step| [step.z0, step.z].map(|z| self.is_at_solution(&z.as_slice()[2..])));
                 take(7, ends.map(|[there, _]| there));
                 take(8, ends.map(|[_, there]| there));
                 // The start of a model is zero: from origins it is that of the problem.
@@ -325,7 +325,7 @@ macro_rules! runs {
                             let z: Vec<_> = all.map(|series| series.values.clone()).collect();
                             (0..3).all(|k| {
                                 let z: Vec<_> = z[2..].iter().zip(&self.start).map(|(z, s)| z[k] + s).collect();
-                                self.is_there(&z)
+                                self.is_at_solution(&z)
                             })
                         }));
                     };

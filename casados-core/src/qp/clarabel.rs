@@ -1,4 +1,4 @@
-//! The solver clarabel behind the trait of this library (feature `clarabel`).
+//! The solver Clarabel as a [`QpSolver`] (feature `clarabel`).
 
 use super::check::check;
 use super::error::{QpError, QpField, Side};
@@ -15,17 +15,17 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 
 /// Clarabel's interior point for sparse problems.
 ///
-/// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order
-/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept
-/// as long as the elements that are not zero stay the same.
+/// It is slower than [`InteriorPoint`](super::InteriorPoint), but supports second-order cones and
+/// shares no code with it. Every start is cold. The symbolic factorisation is reused while the
+/// sparsity pattern is the same.
 ///
-/// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
-/// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,
-/// says what it needs ([`QpSolver::require`]): then a part of that is asked for, and what satisfies
-/// the settings is accepted.
+/// Clarabel's tolerances are relative to the sizes of terms, and one of its two tolerances for the
+/// duality gap suffices. Callers that measure absolute residuals, as SQP does, set the required
+/// accuracy by [`QpSolver::require`]: Clarabel then iterates to a fraction of it, and solutions
+/// that satisfy the settings are accepted.
 ///
-/// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
-/// and a violation that at least one constraint must have.
+/// For an infeasible problem the error names the constraint with the largest multiplier in the
+/// certificate, and a lower bound of the largest violation.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -50,19 +50,19 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 pub struct Clarabel {
     /// Clarabel's own options, which may be changed between calls.
     pub settings: DefaultSettings<f64>,
-    /// Constraints beyond those of the QP. They are checked when a problem is solved.
+    /// Constraints in addition to those of the QP. They are checked by each solve.
     pub cones: Vec<SecondOrderCone>,
-    /// What the caller needs; infinite if nobody said so.
+    /// The residual that the caller requires; infinite by default.
     needed: f64,
     previous: Option<PreviousSolver>,
 }
 
-/// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
-/// size is not known beforehand, and the least that is asked for.
+/// The fraction of the required residual that Clarabel iterates to, since its tolerances are
+/// relative to terms of unknown size, and the smallest tolerance.
 const TOLERANCE_FRACTION: f64 = 1e-3;
 const MIN_TOLERANCE: f64 = 1e-13;
 
-/// A solver and the pattern that it is for.
+/// A solver and its sparsity pattern.
 struct PreviousSolver {
     solver: DefaultSolver<f64>,
     p: CscMatrix<f64>,
@@ -77,7 +77,7 @@ impl Default for Clarabel {
 }
 
 impl Clarabel {
-    /// A solver that is silent, with tolerances of 1e-9.
+    /// A solver without output, with tolerances of 1e-9.
     #[must_use]
     pub fn new() -> Self {
         let settings = DefaultSettings {
@@ -124,8 +124,8 @@ impl Clarabel {
         Ok(())
     }
 
-    /// The settings, with the tolerances that the caller needs. Those of the settings are then what
-    /// is accepted where these are not reached.
+    /// Returns the settings with the required tolerances. The tolerances of the settings become the
+    /// reduced ones, which are accepted if the required ones are not reached.
     fn refined(&self) -> DefaultSettings<f64> {
         let mut settings = self.settings.clone();
         let asked = (TOLERANCE_FRACTION * self.needed).max(MIN_TOLERANCE);
@@ -178,7 +178,7 @@ impl Clarabel {
         Ok(())
     }
 
-    /// The solver, with new data.
+    /// Returns the solver with new data.
     fn prepare(&mut self, sparse: Sparse) -> Result<(&mut DefaultSolver<f64>, Sparse), QpError> {
         let p = matrix(&sparse.p, sparse.q.len(), sparse.q.len());
         let k = matrix(&sparse.k, sparse.b.len(), sparse.q.len());
@@ -196,14 +196,14 @@ impl Clarabel {
                 && (previous.k.m, &previous.cones) == (k.m, &cones)
         };
         let settings = self.refined();
-        // Settings that hold for the life of a solver are refused, and make a new one.
+        // Clarabel rejects updates of some settings; then a new solver is created.
         let updated = self.previous.as_mut().filter(|previous| same(previous)).is_some_and(|previous| {
             previous.solver.update_settings(settings.clone()).is_ok()
                 && previous.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
         });
         if !updated {
-            // What clarabel checks here are the dimensions, which are right by construction, and
-            // the user's settings.
+            // Clarabel checks the dimensions, which are correct by construction, and the user's
+            // settings.
             let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, settings);
             let invalid =
                 QpError::InvalidValue { field: QpField::Settings, stage: 0, index: 0, value: f64::NAN };
@@ -216,7 +216,7 @@ impl Clarabel {
     }
 }
 
-/// Sorted by columns and rows.
+/// Returns a matrix sorted by columns and rows.
 fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
     let mut elements: Vec<_> = triplets.elements.clone();
     elements.sort_unstable_by_key(|&(column, row, _)| (column, row));
@@ -306,7 +306,8 @@ impl QpSolver<f64> for Clarabel {
     }
 }
 
-/// `Kᵀ z = 0` and `bᵀ z < 0` say that the largest violation is at least `−bᵀ z / Σ |z|`.
+/// Returns the error of a certificate: `Kᵀ z = 0` and `bᵀ z < 0` imply that the largest violation
+/// is at least `−bᵀ z / Σ |z|`.
 fn infeasibility_error(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
     let product: f64 = sparse.b.iter().zip(z).map(|(b, z)| b * z).sum();
     let violation = -product / z.iter().map(|z| z.abs()).sum::<f64>();

@@ -1,4 +1,4 @@
-//! The condensed problem: the recursion over the stages of a block.
+//! The condensed problem, by a recursion over the stages of a block.
 
 use super::plan::{Kind, Origin, blocks, row_bounds_and_penalties};
 use crate::qp::element::{get, set};
@@ -9,21 +9,21 @@ use crate::qp::stage::ConstraintVector;
 use crate::scalar::{Packed, Real, Registers};
 use alloc::vec::Vec;
 
-/// The matrices of the recursion, in one memory.
+/// The matrices of the recursion, in one block of memory.
 pub struct Work<'a, T> {
-    /// `Z`, of the next state, then of `(x, u)`
+    /// `Z` of the next state, and of `(x, u)`
     z: &'a mut [T],
     z_next: &'a mut [T],
-    /// `V`, and its next value
+    /// `V`, and its next value.
     v: &'a mut [T],
     m: &'a mut [T],
     /// `−[A B]ᵀ`
     minus: &'a mut [T],
     /// `−[A B]ᵀ V`
     w: &'a mut [T],
-    /// What is constant in rows of `Z`, or their gradient.
+    /// Constants of the rows of `Z`, and gradients of the rows of controls.
     constant: &'a mut [T],
-    /// Gradient with respect to the next state, and to `(x, u)`
+    /// Gradients with respect to the next state, and to `(x, u)`.
     g: &'a mut [T],
     g_next: &'a mut [T],
     offset: &'a mut [T],
@@ -71,7 +71,7 @@ pub struct Condense<'a, T> {
     pub work: Work<'a, T>,
     pub dims: &'a [StageDims],
     pub target: &'a mut [T],
-    /// Room for what the rows of `Z` are.
+    /// Workspace for the origins of the rows of `Z`.
     pub origins: &'a mut Vec<Origin>,
 }
 
@@ -89,7 +89,7 @@ impl<T: Real> Registers<T> for Condense<'_, T> {
 }
 
 impl<T: Real> Condense<'_, T> {
-    /// One block.
+    /// Condenses a block.
     #[inline(always)]
     fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &StageOffsets, rows: &[Origin]) {
         let Self { qp, work, target, origins, .. } = self;
@@ -118,13 +118,13 @@ impl<T: Real> Condense<'_, T> {
 struct Stage<'s, T> {
     place: StageOffsets,
     data: &'s [T],
-    /// How many controls of later stages there are in the block.
+    /// The number of controls of later stages of the block.
     controls: usize,
 }
 
 impl<T: Real> Work<'_, T> {
-    /// `M`, `Z` and their gradients over the variables of a stage, from those over the state behind
-    /// it; or, at the end of a block, from nothing.
+    /// Computes `M`, `Z` and their gradients over the variables of a stage from those over the next
+    /// state; the last stage of a block starts the recursion.
     #[inline(always)]
     fn propagate_stage<E: Packed<T>>(
         &mut self,
@@ -146,7 +146,7 @@ impl<T: Real> Work<'_, T> {
         g_next.iter_mut().zip(linear).for_each(|(g, &linear)| *g = linear);
         let hessian = part(data, place.matrix(), place.hessian());
         if first {
-            // x at the end of the block is A x + B u + b, and costs nothing here.
+            // The state at the end of the block is `A x + B u + b`, and has no cost here.
             for i in 0..next {
                 origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
                 for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
@@ -157,7 +157,7 @@ impl<T: Real> Work<'_, T> {
             copy_common(part_mut(m, 0, hessian.len()), hessian);
             return;
         }
-        // g + V b, and constants + Z b
+        // `g + V b`, and constants `+ Z b`
         let old = origins.len();
         for (offset, &b) in offset.iter_mut().zip(b) {
             *offset = -b;
@@ -174,8 +174,7 @@ impl<T: Real> Work<'_, T> {
         product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
     }
 
-    /// Writes what belongs to the controls of a stage, which is done: columns of rows, `R` and
-    /// bounds.
+    /// Writes the columns of rows, `R` and bounds of the controls of a stage.
     #[inline(always)]
     fn write_controls(&self, stage: &Stage<'_, T>, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
         let StageOffsets { nx, nu, ld, .. } = stage.place;
@@ -201,7 +200,7 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Rows of `Z`: mixed derivatives with respect to the controls of a stage.
+    /// Appends rows to `Z`: mixed derivatives with respect to the controls of a stage.
     #[inline(always)]
     fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
         let StageOffsets { nx, nu, ld, stage: number, .. } = stage.place;
@@ -215,7 +214,7 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Rows of `Z`: those of the `rows` of a block that are constraints of a stage, with their
+    /// Appends rows to `Z`: the constraints of a stage among the `rows` of a block, with their
     /// bounds.
     #[inline(always)]
     fn add_constraint_rows(
@@ -233,7 +232,7 @@ impl<T: Real> Work<'_, T> {
             let general = origin.index.checked_sub(ld);
             for j in 0..n {
                 let element = match general {
-                    // After `[A B]ᵀ`.
+                    // The constraints follow `[A B]ᵀ`.
                     Some(general) => get(stage.data, (next + general) * ld + j),
                     None if origin.index == j => T::ONE,
                     None => T::ZERO,
@@ -258,7 +257,7 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// What is left is a function of the state of the stage.
+    /// Moves the recursion to the state of the stage.
     #[inline(always)]
     fn shift_to_previous_stage(&mut self, n: usize, nx: usize) {
         let Self { z, z_next, v, m, g, g_next, .. } = self;
@@ -275,7 +274,7 @@ impl<T: Real> Work<'_, T> {
         part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
     }
 
-    /// Writes what belongs to the first state of a block.
+    /// Writes the columns, `Q` and bounds of the first state of a block.
     #[inline(always)]
     fn write_first_state(
         &self,
@@ -305,7 +304,7 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Writes what is constant in the rows of a block.
+    /// Subtracts the constants of the rows of a block from their bounds.
     #[inline(always)]
     fn write_bound_offsets(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
@@ -325,13 +324,13 @@ impl<T: Real> Work<'_, T> {
     }
 }
 
-/// Where the element of a row of `Z` with a variable of the condensed stage lies.
+/// Returns the index of the element of a row of `Z` for a variable of the condensed stage.
 fn row_element_index(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,
-        // Below the diagonal: a later control comes first, so this is its row with states, and its
-        // column with controls.
+        // Below the diagonal: later controls come first, so that this is its row with states, and
+        // its column with controls.
         Kind::Control if variable < to.nx => to.matrix() + variable * to.ld + to.nx + origin.index,
         Kind::Control => to.matrix() + (to.nx + origin.index) * to.ld + variable,
     }

@@ -1,4 +1,4 @@
-//! Between solutions of the problem and of the condensed one.
+//! Conversion between solutions of the original and the condensed problem.
 
 use super::plan::{Origin, blocks};
 use crate::qp::element::{get, set};
@@ -58,12 +58,12 @@ fn copy_either_way<T: Real>(full: &mut [T], a: usize, condensed: &mut [T], b: us
     }
 }
 
-/// The states and multipliers that were eliminated.
+/// Computes the eliminated states and multipliers.
 pub struct Expand<'a, 's, T> {
     pub qp: QpView<'a, T>,
     pub block: usize,
     pub solution: SolutionView<'s, T>,
-    /// Room for a vector over next states and general constraints, and for a gradient.
+    /// Workspace for a vector over next states and general constraints, and for a gradient.
     pub minus: &'a mut [T],
     pub g: &'a mut [T],
 }
@@ -109,7 +109,8 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
     }
 }
 
-/// `Σ ½ vᵀ H v + hᵀ v`, with room for a vector over the variables of a stage.
+/// Returns `Σ ½ vᵀ H v + hᵀ v`; `product` is the workspace for a vector over the variables of a
+/// stage.
 pub fn stage_cost_and_product<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut [T]) -> f64 {
     let mut sum = 0.0;
     for place in Places::<T>::new(qp.dims) {

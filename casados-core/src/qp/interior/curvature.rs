@@ -1,4 +1,4 @@
-//! Whether a negative pivot is negative curvature, or rounding.
+//! Test whether a negative pivot is negative curvature or a rounding error.
 
 use super::cholesky::{substitute, unit};
 use super::kernels::{Columns, add_transposed, symmetric};
@@ -10,10 +10,10 @@ use crate::qp::problem::QpView;
 use crate::scalar::Real;
 
 impl<T: Real> Riccati<'_, T> {
-    /// An error if the Hessian curves downwards along the direction in which a pivot is negative:
-    /// that of one control (behind the controls, of a state at the start), with which the ones
-    /// before it and all that come later move such that the rest of `dᵀ M d` vanishes. Otherwise
-    /// the pivot is rounding.
+    /// Returns an error if the Hessian has negative curvature along the direction of a negative
+    /// pivot; otherwise the pivot is a rounding error. The direction has a one in one control (or,
+    /// with an index from `nu` on, in one initial state); earlier pivots and later stages follow
+    /// such that the rest of `dᵀ M d` vanishes.
     pub fn verify(
         &mut self,
         qp: QpView<'_, T>,
@@ -32,7 +32,7 @@ impl<T: Real> Riccati<'_, T> {
             let v = part_mut(take_mut(&mut rest, place.rows), 0, ld);
             let state = index.checked_sub(nu);
             let (begin, from_here) = (if state.is_some() { 0 } else { nx }, place.stage == from.stage);
-            // The state comes from the stage before.
+            // The state is determined by the stage before.
             let given = if from_here { 0 } else { nx };
             v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
             if from_here {

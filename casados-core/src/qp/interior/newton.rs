@@ -1,4 +1,4 @@
-//! Newton's step from an iterate, and the way along it.
+//! The Newton step from an iterate, and its update.
 
 use super::iterate::{Iterate, at, scaled_proximal_weight, scatter};
 use super::riccati::Equations;
@@ -8,8 +8,8 @@ use crate::qp::layout::{Places, copy_common, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Iterate<'_, T> {
-    /// Newton's step, with `s Δλ + λ Δs = s · target`. Changes of slacks and multipliers are those
-    /// of pairs afterwards.
+    /// Computes the Newton step with `s Δλ + λ Δs = (s + δ λ) · target`; the pairs then have the
+    /// changes of slacks and multipliers.
     #[inline(always)]
     pub fn newton<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
         self.sides.assemble_weights(factor);
@@ -24,8 +24,8 @@ impl<T: Real> Iterate<'_, T> {
         Ok(())
     }
 
-    /// Newton's equations with the weights of the sides, and what they add to the gradient in
-    /// `scratch`, where the changes of their distances are afterwards.
+    /// Solves Newton's equations with the weights of the sides and their gradient terms in
+    /// `scratch`; leaves the changes of their distances in `scratch`.
     #[inline(always)]
     pub fn solve<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
         self.assemble(factor);
@@ -49,7 +49,7 @@ impl<T: Real> Iterate<'_, T> {
         Ok(())
     }
 
-    /// Gradient and weights of Newton's equations.
+    /// Assembles the gradient and the weights of Newton's equations.
     #[inline(always)]
     pub fn assemble(&mut self, factor: bool) {
         let weight = T::ONE / self.sides.compliance;
@@ -82,21 +82,21 @@ impl<T: Real> Iterate<'_, T> {
         }
     }
 
-    /// The changes of the distances of sides, from the step.
+    /// Computes the changes of the distances of the sides from the step.
     #[inline(always)]
     pub fn side_steps(&mut self) {
         self.sides.evaluate_sides(self.step, |value, _| value, |value, _| -value);
     }
 
-    /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals
-    /// stay as they were.
+    /// Takes the fraction `primal` of the step, and `dual` of the step of the multipliers of the
+    /// sides. Residuals are unchanged.
     pub fn go(&mut self, primal: T, dual: T) {
         add_scaled(self.v, primal, self.step);
         add_scaled(self.sides.slack, primal, self.sides.slack_step);
         self.step_multipliers(dual, primal);
     }
 
-    /// The point and the multipliers after the full step; slacks stay as they are.
+    /// Takes the full step of the point and the multipliers; slacks are unchanged.
     pub fn step_without_slacks(&mut self) {
         add_scaled(self.v, T::ONE, self.step);
         self.step_multipliers(T::ONE, T::ONE);
@@ -108,7 +108,7 @@ impl<T: Real> Iterate<'_, T> {
         add_scaled(sides.free, of_equations, sides.free_step);
     }
 
-    /// Goes a part of the step.
+    /// Takes the fraction `alpha` of the step, and updates the residuals.
     #[inline(always)]
     pub fn advance<E: Packed<T>>(&mut self, alpha: T) {
         let weight = T::ONE / self.sides.compliance;
@@ -137,7 +137,7 @@ impl<T: Real> Iterate<'_, T> {
         }
         let (proximal, units) = (self.proximal, self.units);
         if self.riccati.regularised > 0 || proximal > T::ZERO {
-            // What was added to a pivot is a force that keeps its variable where it is.
+            // An increase of a pivot acts as a proximal term of its variable.
             for place in Places::<T>::new(self.qp.dims) {
                 let added = self.riccati.added.get(place.v..).unwrap_or_default();
                 let step = part(self.step, place.row, place.n);
@@ -154,8 +154,7 @@ impl<T: Real> Iterate<'_, T> {
         self.mu = self.sides.mu::<E>();
     }
 
-    /// The next solve with the same matrix has other residuals of the dynamics: none, but for
-    /// rounding.
+    /// Sets the dynamics residuals of the next solve with the same matrix to zero.
     pub fn clear_dynamics_residuals(&mut self) {
         self.riccati.clear_dynamics_residuals();
         if let Some(coupling) = &mut self.coupling {

@@ -1,4 +1,4 @@
-//! Residuals of an iterate, and what they are sums of.
+//! Residuals of an iterate, and their terms.
 
 use super::iterate::Iterate;
 use super::units::Units;
@@ -8,7 +8,7 @@ use crate::qp::marked_indices;
 use crate::qp::statistics::{Residuals, nan_max};
 use crate::scalar::{Packed, Real};
 
-/// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
+/// Residuals of the optimality conditions, the largest element of each: see [`Residuals`].
 #[derive(Clone, Copy)]
 pub struct MaxResiduals<T> {
     pub stationarity: T,
@@ -30,14 +30,14 @@ impl<T: Real> From<MaxResiduals<T>> for Residuals {
 }
 
 impl<T: Real> Iterate<'_, T> {
-    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, in units, after
-    /// [`evaluate`](Self::evaluate).
+    /// Returns the residuals as [`qp::residuals`](crate::qp::residuals) does, in units, after
+    /// [`evaluate`](Self::evaluate), at least the rounding errors of their terms.
     #[inline(always)]
     pub fn judged<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
         let MaxResiduals { stationarity, dynamics, inequalities, complementarity } =
             self.point_residuals::<E>();
-        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
-        // the terms; in another order the sums of values are rounded otherwise.
+        // The recursion for `π` makes gradients zero up to rounding errors; another order of
+        // summation has other rounding errors.
         let rounding = |terms| T::from_f64(T::EPSILON) * terms;
         MaxResiduals {
             stationarity: nan_max(stationarity, rounding(self.terms.forces)),
@@ -47,14 +47,14 @@ impl<T: Real> Iterate<'_, T> {
         }
     }
 
-    /// As [`judged`](Self::judged), without what rounding may be.
+    /// As [`judged`](Self::judged), without the rounding errors.
     #[inline(always)]
     pub fn point_residuals<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
         self.sides.split_soft_distances();
         self.residuals_in_units::<E>(self.measure)
     }
 
-    /// Residuals that were [`judged`](Self::judged), in the units of the user.
+    /// Returns the [`judged`](Self::judged) residuals without units.
     pub fn unscaled_residuals(&self, judged: MaxResiduals<T>) -> Residuals {
         if self.measure.rows.is_empty() {
             judged.into()
@@ -74,7 +74,7 @@ impl<T: Real> Iterate<'_, T> {
         }
     }
 
-    /// The largest element of the gradient of the Lagrangian.
+    /// Returns the largest element of the gradient of the Lagrangian.
     #[inline(always)]
     pub fn max_gradient<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         if units.rows.is_empty() {
@@ -83,7 +83,7 @@ impl<T: Real> Iterate<'_, T> {
         largest_scaled_magnitude(T::ZERO, self.stationarity, units.rows, |g, unit| g * unit) / units.objective
     }
 
-    /// The largest residual of dynamics and of conditions between stages.
+    /// Returns the largest residual of dynamics and of couplings.
     #[inline(always)]
     pub fn gaps<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         let over = |gap, unit| gap / unit;
@@ -100,10 +100,10 @@ impl<T: Real> Iterate<'_, T> {
         conditions.fold(gaps, |most, (gap, state)| nan_max(most, over(gap.abs(), units.of(state))))
     }
 
-    /// The residuals as they are known, in units.
+    /// Returns the updated residuals, in units.
     #[inline(always)]
     pub fn residuals<E: Packed<T>>(&self) -> MaxResiduals<T> {
-        // Products may lose NaN, their sum does not.
+        // Products may lose NaN, but their sum does not.
         let products = largest_product::<T, E>(T::ZERO, self.sides.slack, self.sides.multiplier);
         let products = if self.mu.is_finite() { products } else { self.mu };
         MaxResiduals {

@@ -1,4 +1,4 @@
-//! The iterations.
+//! The iterations of the interior point.
 
 use super::iterate::Iterate;
 use super::limits::ResidualTolerances;
@@ -15,40 +15,40 @@ use crate::qp::solver::QpStart;
 use crate::qp::statistics::{QpStatistics, nan_max};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
-/// How a problem is to be solved.
+/// The settings of an attempt.
 #[derive(Clone, Copy)]
 pub struct Attempt {
     pub penalties: PenaltyMode,
     pub start: QpStart,
-    /// Whether steps are kept short by proximal terms, for Hessians that are singular.
+    /// Whether steps have proximal terms, for singular Hessians.
     pub proximal: bool,
-    /// What attempts before have taken.
+    /// The statistics of earlier attempts.
     pub statistics: QpStatistics,
-    /// The iterations at which it ends.
+    /// The iteration count at which it ends.
     pub iterations: usize,
-    /// Whether it ends where its multipliers are nearly a proof that there is no solution.
+    /// Whether it ends if its multipliers are nearly a certificate of infeasibility.
     pub suspects: bool,
 }
 
 impl Attempt {
-    /// Whether nothing was tried before.
+    /// Returns whether this is the first attempt.
     fn is_first(&self) -> bool {
         self.penalties == PenaltyMode::Given && !self.proximal && self.statistics.iterations == 0
     }
 }
 
-/// One run of the method.
+/// A run of the method.
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
     pub limits: ResidualTolerances<T>,
-    /// Whether the time is over.
+    /// Returns whether the time limit is reached.
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<QpStatistics, QpError>,
-    /// Whether the multipliers prove that no point satisfies all constraints; of the problem as it
-    /// is, whether they are nearly a proof.
+    /// Whether the multipliers are a certificate of infeasibility; with the objective, whether they
+    /// nearly are.
     pub infeasible: &'r mut bool,
 }
 
@@ -67,7 +67,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
         }
         let tries = match attempt.start {
             QpStart::Warm => options.active_sets,
-            // Where no bound is active this is the solution.
+            // This is the solution if no bound is active.
             QpStart::Cold if attempt.is_first() => options.active_sets.min(1),
             QpStart::Cold => 0,
         };
@@ -77,7 +77,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                 zero.fill(T::ZERO);
             }
         }
-        // No closure: it would be compiled for another machine.
+        // A closure would be compiled for the baseline instruction set.
         *result = match iterate.by_active_sets::<E>((attempt.start, tries), &limits, over, solution) {
             Ok(statistics) => Ok(statistics),
             Err(statistics) => {
@@ -98,37 +98,39 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     }
 }
 
-/// A step of the corrector below this is not taken.
+/// The smallest accepted step length of the corrector.
 const MIN_CORRECTOR_STEP: f64 = 0.3;
 
-/// The terms of the residuals are computed again where `μ` is this part of what it was.
+/// The terms of the residuals are evaluated again if `μ` has decreased by this factor.
 const TERMS_UPDATE_RATIO: f64 = 0.01;
 
-/// An iteration that leaves less than this part makes progress; so many may make none.
+/// An iteration makes progress if it decreases the residuals by this factor; the maximum number of
+/// iterations without progress.
 const PROGRESS: f64 = 0.9;
 const MAX_IDLE_ITERATIONS: usize = 50;
-/// After so many correctors may go in a circle.
+/// The number of iterations without progress after which the correctors are assumed to cycle.
 const CYCLE: usize = 8;
 
-/// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
+/// Slacks and multipliers keep at least this fraction of their values, or, near the solution, the
+/// fraction `μ`.
 const MIN_BOUNDARY_FRACTION: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
-    /// States and controls of a solution.
+    /// Reads states and controls of a solution.
     pub fn load_point(&mut self, solution: &SolutionView<'_, T>) {
         for place in Places::<T>::new(self.qp.dims) {
             copy_common(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
     }
 
-    /// A point and multipliers of zero.
+    /// Sets the point and the multipliers to zero.
     fn forget(&mut self) {
         self.v.fill(T::ZERO);
         self.sides.multiplier.fill(T::ZERO);
         self.sides.free.fill(T::ZERO);
     }
 
-    /// The state at the start, if it is given.
+    /// Writes the fixed initial state.
     pub fn load_initial_state(&mut self) {
         if let (InitialStateKind::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
             let x0 = stage.x_bounds().lower;
@@ -154,27 +156,27 @@ impl<T: Real> Iterate<'_, T> {
         let gap = self.gaps::<E>(self.measure).max(self.sides.violation(self.measure));
         let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
-            // The farther it is from being feasible, the less its slacks and multipliers mean.
+            // Slacks and multipliers of a point with large violations are less reliable.
             QpStart::Warm if warm < cold => warm,
-            // Slacks that are small beside violations make steps short.
+            // Slacks that are small compared with violations cause short steps.
             QpStart::Cold if attempt.proximal => gap.max(cold),
             _ => cold,
         };
         self.sides.begin(start, distance, self.measure, solution);
-        // Only now are slacks what they are.
+        // Residuals depend on the slacks, which are set now.
         self.evaluate_side_residuals::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
         self.set_regularisation(attempt.proximal);
     }
 
-    /// The gradient before the first step. No step depends on the multipliers of the dynamics:
-    /// where the recursion, still without feedback, lets them grow so large that a gradient that
-    /// should vanish is not seen among their rounding errors, they are zero.
+    /// Evaluates the gradient before the first step. The open-loop recursion of the multipliers
+    /// `π`, without factors yet, may grow so much that its rounding errors exceed the tolerance of
+    /// the gradient; then `π` is set to zero. No step depends on `π`.
     #[inline(always)]
     pub fn first_gradient<E: Packed<T>>(&mut self, limits: &ResidualTolerances<T>, multipliers: &mut [T]) {
         self.evaluate_gradient::<E>(multipliers);
         let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
-        // NaN is not small either.
+        // NaN counts as large.
         let is_seen = rounding <= limits.of(self.terms).forces;
         if !is_seen {
             multipliers.fill(T::ZERO);
@@ -201,11 +203,10 @@ impl<T: Real> Iterate<'_, T> {
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.satisfied_by(residuals, self.terms);
-            // Terms change on the way.
+            // Terms change with the iterates.
             let old = limits.relative > T::ZERO && self.mu < T::from_f64(TERMS_UPDATE_RATIO) * known;
             if small || old {
-                // What is known of the residuals is what steps should have left of them: now they
-                // are computed.
+                // The updated residuals are small: evaluate them at the point.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.judged::<E>(), self.mu);
                 if objective.is_finite() && self.is_converged(residuals, limits) {
@@ -216,22 +217,24 @@ impl<T: Real> Iterate<'_, T> {
                 let Terms { forces, values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
                 if limits.satisfied_by(residuals, self.terms) {
-                    // In units they are, but not beside their terms.
+                    // The residuals are small in units, but not without units relative to their
+                    // terms.
                     share = share * T::from_f64(0.01);
                 } else if small && apart {
-                    // Between two pieces of a penalty multipliers are off by the root of their
+                    // At the kink of a penalty multipliers have errors of the square root of their
                     // products.
                     share = share * T::from_f64(0.01);
                 } else if small && statistics.refinements > known_refinements + 3 {
                     break true;
                 } else {
-                    // Multipliers and slacks are good: the next step is to correct the others only.
+                    // Multipliers and slacks have converged: the next step corrects the other
+                    // residuals only.
                     refine = small;
                     statistics.refinements += usize::from(small);
                 }
             }
-            // Products far below the tolerance gain nothing, and make weights that swallow the
-            // digits of everything else.
+            // Products far below the tolerance have no benefit, and cause weights that cancel the
+            // digits of all other terms.
             let floor = share * limits.of(self.terms).forces * self.measure.objective;
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
@@ -269,8 +272,8 @@ impl<T: Real> Iterate<'_, T> {
         self.final_status::<E>(statistics, limits, [out_of_time, stalled], solution)
     }
 
-    /// Corrects the step for what products change by, and by how much of it slacks and multipliers
-    /// stay positive.
+    /// Adds Mehrotra's corrector to the step, for the second-order terms of the products, and
+    /// returns the step length to the boundary.
     ///
     /// # Errors
     /// [`QpError::NotConvex`]
@@ -295,7 +298,8 @@ impl<T: Real> Iterate<'_, T> {
         self.newton::<E>(false)?;
         alpha = self.sides.step_to_boundary::<E>(keep);
         if alpha < T::from_f64(MIN_CORRECTOR_STEP) || is_cycling {
-            // Products are too different for the corrector to be right: first they are made equal.
+            // The products differ too much for the corrector: a centring step makes them equal
+            // first.
             self.sides.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
             self.newton::<E>(false)?;
             alpha = self.sides.step_to_boundary::<E>(keep);
@@ -303,8 +307,8 @@ impl<T: Real> Iterate<'_, T> {
         Ok(alpha)
     }
 
-    /// What is said of the point that is left, which may be better than what was known of it: so
-    /// are the multipliers of the dynamics.
+    /// Returns the status at the final point, after evaluating its residuals and the multipliers
+    /// `π`.
     #[inline(always)]
     fn final_status<E: Packed<T>>(
         &mut self,
@@ -330,7 +334,7 @@ impl<T: Real> Iterate<'_, T> {
         })
     }
 
-    /// The point and its multipliers.
+    /// Writes the point and its multipliers.
     pub fn store(&mut self, solution: &mut SolutionView<'_, T>) {
         for place in Places::<T>::new(self.qp.dims) {
             copy_common(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));

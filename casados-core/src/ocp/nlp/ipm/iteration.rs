@@ -30,26 +30,27 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
-/// it was at the start, or of one: an objective that becomes less leads no farther away.
+/// The largest ratio of violations after and before a step. The reference is at most the initial
+/// violation, or one: a decreasing objective must not lead far from feasible points.
 const MAX_VIOLATION_GROWTH: f64 = 10.0;
-/// The Hessian of the Lagrangian as it is.
+/// The Hessian of the Lagrangian without convexification.
 const EXACT_HESSIAN: Exact = Exact { convexification: Convexification::None };
 
-/// A search direction, and how far it may be gone.
+/// A search direction and its largest step lengths.
 struct SearchDirection {
     filter_model: FilterModel,
     tau: f64,
     max_alpha_primal: f64,
     max_alpha_dual: f64,
-    /// It moves nothing but rounding errors.
+    /// Whether all changes are of the size of rounding errors.
     is_tiny: bool,
-    /// Whether it has the changes of products.
+    /// Whether it has a higher-order correction.
     is_corrected: bool,
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
+    /// Writes the QP at the iterate. New slacks come with new multipliers, which the Hessian
+    /// contains.
     pub(super) fn linearise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -83,7 +84,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, and the best iterate.
+    /// Updates residuals, barrier parameter and best iterate.
     fn update_residuals<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -140,7 +141,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Barrier function and violation at the iterate.
+    /// Returns barrier function and violation at the iterate.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -161,7 +162,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             dimensions.units(workspace.units),
         );
         if P::LIFTED {
-            // The QP has the ends of intervals where the next step would lead to.
+            // The QP contains the ends of intervals that the next step of the stages leads to.
             let mut line_search = LineSearch {
                 dimensions: &dimensions,
                 kkt_numbers,
@@ -180,7 +181,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(current_pair)
     }
 
-    /// What is to be expected along the search direction, and how far it may be gone.
+    /// Computes the filter model along the search direction, and the largest step lengths.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -224,8 +225,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         })
     }
 
-    /// How far the search direction is gone. A corrected one is gone as far as it may be, or
-    /// not at all: then the direction is that without the correction.
+    /// Returns the step length. A corrected direction is taken at its full length; if the filter
+    /// rejects it, the line search uses the direction without correction.
     fn line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -273,7 +274,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         line_search!(workspace).search(ocp, state, expected, *primal, *tau)
     }
 
-    /// Goes the step that was accepted.
+    /// Applies the accepted step.
     fn apply_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -308,7 +309,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         barrier::correct_bound_multipliers(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
         ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
-        // The line search ends where it accepts a point; a tiny step has none.
+        // The line search has evaluated the accepted point; a tiny step has no line search.
         ocp.algebraic_is_current = !direction.is_tiny;
         Ok(())
     }
@@ -365,7 +366,7 @@ where
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
-                // A derivative that is not finite is another error.
+                // A non-finite derivative ends the run with an error.
                 ocp.qp_failure_status(error)?;
                 return Ok(self.recover_from_failed_step(ocp, state));
             }
@@ -405,7 +406,7 @@ where
     ) -> bool {
         let restarts = self.try_restart(ocp, state, final_status);
         if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
-            // That is said of the last iterate.
+            // The verdict holds at the last iterate.
             state.best_iteration = *log_row;
         }
         restarts

@@ -1,4 +1,4 @@
-//! How far a step goes: the filter line search with second-order corrections.
+//! Filter line search with second-order corrections.
 
 use super::kkt::barrier_function;
 use super::kkt::dimensions::KktDimensions;
@@ -15,22 +15,22 @@ use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
-/// `γ_α`
+/// `γ_α`, a factor of the shortest step.
 const ALPHA_MIN_FRAC: f64 = 0.05;
-/// Corrections of one step.
+/// The largest number of second-order corrections of a step.
 const MAX_SOC: usize = 4;
-/// `κ_soc`: a correction that leaves more of the violation is the last one.
+/// `κ_soc`: a correction that leaves more than this fraction of the violation is the last one.
 const KAPPA_SOC: f64 = 0.99;
 
-/// What is known before a line search.
+/// The filter's model of the barrier function along the search direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FilterModel {
     pub current: FilterPair,
-    /// `∇φᵀ d`, in units of forces.
+    /// The slope `∇φᵀ d`, in units of the objective.
     pub slope: f64,
-    /// `θ_min`: below this violation the barrier function may decide.
+    /// `θ_min`: the switching condition requires a violation of at most this.
     pub theta_min: f64,
-    /// No step leaves more violation.
+    /// The largest acceptable violation of a step.
     pub max_violation: f64,
     pub mu: f64,
     /// `δ_w`
@@ -40,13 +40,13 @@ pub(super) struct FilterModel {
 }
 
 impl FilterModel {
-    /// Whether the barrier function decides after a step of this length.
+    /// Whether the barrier function must decrease sufficiently for a step of this length.
     fn switching_condition_holds(&self, alpha: f64) -> bool {
         self.current.violation <= self.theta_min
             && switching_condition_holds(alpha, self.slope, self.current.violation)
     }
 
-    /// The shortest step that can be accepted (equation (23)).
+    /// The shortest acceptable step (equation (23)).
     fn min_alpha(&self) -> f64 {
         let FilterPair { violation, .. } = self.current;
         let mut smallest_ratio: f64 = GAMMA_THETA;
@@ -60,18 +60,18 @@ impl FilterModel {
         (ALPHA_MIN_FRAC * smallest_ratio).max(1e-14)
     }
 
-    /// Whether neither the violation nor the barrier function changes by more than rounding errors:
-    /// the step changes multipliers.
+    /// Whether violation and barrier function change by rounding errors only: the step changes
+    /// multipliers.
     fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
         self.current.violation <= self.rounding_violation
             && trial_pair.violation <= self.rounding_violation
             && (trial_pair.objective - self.current.objective).abs() <= noise
     }
 
-    /// Whether a point after a step of this length is good enough; the filter grows where the
-    /// barrier function does not decide.
+    /// Whether the point at this step length is acceptable. Adds the iterate to the filter if the
+    /// switching condition does not hold.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, trial_pair: &FilterPair) -> bool {
-        // What rounding leaves of a difference of barrier functions.
+        // The rounding error of a difference of barrier functions.
         let noise = 10.0 * f64::EPSILON * self.current.objective.abs();
         if self.changes_only_rounding(trial_pair, noise) {
             return true;
@@ -89,25 +89,25 @@ impl FilterModel {
     }
 }
 
-/// A step that was accepted.
+/// An accepted step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AcceptedStep {
     pub alpha: f64,
     pub corrected: bool,
 }
 
-/// What a line search finds.
+/// The result of a line search.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum LineSearchOutcome {
-    /// A step.
+    /// An accepted step.
     Step(AcceptedStep),
-    /// No step is short enough.
+    /// No step above the shortest one is acceptable.
     NoStep,
-    /// The time was over before.
+    /// The deadline has passed.
     OutOfTime,
 }
 
-/// The memory that a line search works on.
+/// The memory of a line search.
 pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
     pub dimensions: &'r KktDimensions,
     pub kkt_numbers: &'r mut N,
@@ -124,7 +124,8 @@ where
     N: Store<T>,
     I: Store<u32>,
 {
-    /// Whether the filter accepts a step of this length; a point without a value is not accepted.
+    /// Whether the filter accepts a step of this length. A point with a non-finite function is not
+    /// accepted.
     pub fn accepts<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -138,7 +139,7 @@ where
     /// Halves the step until the filter accepts it.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]; points without a value are not good enough.
+    /// [`OcpError::OutOfMemory`]; a point with a non-finite function is rejected.
     pub fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -155,7 +156,7 @@ where
             if trial_pair.is_some_and(|there| model.accepts(filter, alpha, &there)) {
                 return Ok(LineSearchOutcome::Step(AcceptedStep { alpha, corrected: false }));
             }
-            // Corrections know nothing of stages.
+            // Second-order corrections ignore lifted stages.
             let violation_grows =
                 !P::LIFTED && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
             if alpha == max_alpha
@@ -172,8 +173,7 @@ where
         Ok(LineSearchOutcome::NoStep)
     }
 
-    /// Barrier function and violation after a part of the step; nothing where a function has no
-    /// value.
+    /// Returns barrier function and violation at a step length; `None` if a function is not finite.
     pub fn evaluate_trial<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -211,7 +211,7 @@ where
         })
     }
 
-    /// The point and the slacks after a part of the step.
+    /// Writes the trial point and its slacks.
     pub fn write_trial_point<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -235,8 +235,8 @@ where
         Some(())
     }
 
-    /// Second-order corrections: constraints take their values at the point that was tried.
-    /// Afterwards the step is what was accepted, or what it was before.
+    /// Computes second-order corrections, with the constraint values of the trial point. Restores
+    /// the step if no correction is accepted.
     fn second_order_correction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -265,7 +265,7 @@ where
                     self.workspace.units,
                 )?;
                 iterate.units = self.workspace.units;
-                // Sides keep their slacks; the gradient stays what it was.
+                // Slacks and gradient are unchanged.
                 evaluate_linear_residuals(&mut iterate);
                 let (mu, delta) = (T::from_f64(model.mu), T::from_f64(model.delta_w));
                 let solved = super::kkt::newton::newton_step(&mut iterate, mu, delta)
@@ -297,7 +297,7 @@ where
     }
 }
 
-/// The longest step after which `1 − τ` of every number is left, at most 1.
+/// The longest step, at most 1, that leaves at least `1 − τ` of every value.
 pub(super) fn max_step_to_boundary<T: Real>(values: &[T], steps: &[T], tau: f64) -> f64 {
     let mut ratio = 1.0f64;
     for (&value, &step) in values.iter().zip(steps) {

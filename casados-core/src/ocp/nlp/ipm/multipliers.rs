@@ -1,4 +1,5 @@
-//! Multipliers: the first ones, those that the Hessian has, and those that hold slacks.
+//! Multipliers: least-squares multipliers, multipliers of the Hessian, and the reset of small
+//! slacks.
 
 use super::Ipm;
 use super::barrier;
@@ -16,19 +17,19 @@ use crate::ocp::formulation::program::Program;
 use crate::qp::{StageDims, Store, copy_common};
 use crate::scalar::Real;
 
-/// First multipliers that are more units are discarded.
+/// The largest initial multiplier in units; if one is larger, all are discarded.
 const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Slacks and multipliers of the first iteration, or of new penalties.
+    /// Initialises slacks and multipliers in the first iteration, or for new penalties.
     pub(super) fn initialise_slacks_and_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut RunState<'_>,
     ) -> Result<(), OcpError> {
-        // Multipliers of hard bounds say nothing about penalties.
+        // Multipliers of hard bounds are not those of penalties.
         let warm = self.options.warm_start && state.elastic_penalty.is_none();
-        // Other penalties have their numbers at other places.
+        // New penalties change the layout of the memory.
         self.kkt_numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
@@ -72,7 +73,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Writes the multipliers that the Hessian has.
+    /// Writes the multipliers of the Hessian into the iterate.
     pub(super) fn load_hessian_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -91,7 +92,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
+    /// Resets slacks that are shorter than the distances from their bounds.
     pub(super) fn reset_small_slacks<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

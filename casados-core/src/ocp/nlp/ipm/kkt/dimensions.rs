@@ -1,25 +1,25 @@
-//! How much memory Newton's equations take.
+//! Dimensions of Newton's equations.
 
 use crate::ocp::assembly::units::{ProblemScaling, ScalingUnits};
 use crate::qp::interior::{Counts, Extent, Iterate, PenaltyMode, Reading, count, is_initial_state_fixed};
 use crate::qp::{InteriorPointOptions, QpView};
 use crate::scalar::Real;
 
-/// What is known about the sides of a problem before any memory is touched.
+/// Numbers of inequalities and lengths of memory, known before memory is allocated.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp::nlp) struct KktDimensions {
     pub counts: Counts,
     pub has_fixed_initial_state: bool,
     pub number_count: usize,
     pub extent: Extent,
-    /// What is known of units.
+    /// The objective unit and the smallest unit of a row.
     pub scaling: ProblemScaling,
-    /// Whether violations count alone, without the objective.
+    /// Whether the run is in the restoration phase.
     pub in_restoration: bool,
 }
 
 impl KktDimensions {
-    /// Of a problem with its penalties as they are.
+    /// Dimensions of a problem with its present penalties.
     pub fn from_qp<T: Real>(qp: QpView<'_, T>) -> Self {
         let reading = reading_options(qp);
         let counts = count(qp, &reading);
@@ -34,24 +34,24 @@ impl KktDimensions {
         }
     }
 
-    /// Units whose sizes these are.
+    /// The units of all rows, with the scaling.
     pub fn units<'a, T>(&self, rows: &'a [T]) -> ScalingUnits<'a, T> {
         ScalingUnits { scaling: self.scaling, rows }
     }
 
-    /// Of the same problem with every bound soft, equations too.
+    /// Dimensions of the same problem with every bound and equation soft.
     pub fn with_all_bounds_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
         let counts = counts_with_all_bounds_soft(&self.counts);
         Self { counts, number_count: kkt_number_count::<T>(qp, &counts), ..*self }
     }
 }
 
-/// How many numbers Newton's equations take, with changes of multipliers of equations.
+/// The number count of Newton's equations, with the steps of the multipliers of equations.
 fn kkt_number_count<T: Real>(qp: QpView<'_, T>, counts: &Counts) -> usize {
     Iterate::<T>::memory_of(qp, counts) + counts.equations
 }
 
-/// Every bound soft, equations too.
+/// Counts with every bound and equation soft.
 pub(in crate::ocp::nlp::ipm) const fn counts_with_all_bounds_soft(counts: &Counts) -> Counts {
     let Counts { lower, upper, equations, .. } = *counts;
     let (lower, upper) = (lower + equations, upper + equations);

@@ -1,7 +1,7 @@
-//! Newton's equations of the barrier problem, over the memory of a run.
+//! Newton's equations of the barrier problem, in the memory of a run.
 //!
-//! With the QP written at the iterate, one step of the interior point of QPs from there is a step
-//! of that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
+//! With the QP written at the iterate, one step of the QP's interior point is the Newton step of
+//! the nonlinear barrier problem: same slacks, same multipliers, exact Hessians.
 
 use super::dimensions::{KktDimensions, reading_options};
 use super::workspace::Workspace;
@@ -10,7 +10,7 @@ use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
 use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, copy_common, take_mut};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
-/// The iterate of Newton's method in its memory, whose contents stay as they were.
+/// Returns the iterate of Newton's method as a view of its memory, whose contents are unchanged.
 ///
 /// # Errors
 /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -32,8 +32,8 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     Ok(iterate)
 }
 
-/// As [`kkt_view`], where the QP is new: sides are listed, with its bounds and penalties. What
-/// equations give way is measured in `units` of their rows.
+/// Returns the view of [`kkt_view`] for a new QP: lists its inequalities with their bounds and
+/// penalties. The dual regularisation of equations is scaled by the `units` of their rows.
 ///
 /// # Errors
 /// As [`kkt_view`].
@@ -54,8 +54,8 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
     Ok(iterate)
 }
 
-/// Evaluates all residuals at a point with its multipliers `π`: the largest of those of the
-/// problem, and what violations of soft bounds cost.
+/// Evaluates all residuals at a point with its multipliers `π`. Returns the largest residuals of
+/// the problem, and the penalties of violated soft bounds.
 pub(in crate::ocp::nlp::ipm) fn evaluate_residuals<T: Real>(
     iterate: &mut Iterate<'_, T>,
     at: &mut SolutionView<'_, T>,
@@ -77,7 +77,7 @@ struct EvaluateResiduals<'r, 'a, 's, T> {
     output: &'s mut (Residuals, f64),
 }
 
-compiled!(/// See [`Evaluate`].
+compiled!(/// See [`EvaluateResiduals`].
 EvaluateResidualsCompiled: EvaluateResiduals<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
@@ -90,7 +90,8 @@ impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
     }
 }
 
-/// Residuals of what is linear in the QP at the iterate, after its constants have changed.
+/// Evaluates the residuals that are linear in the QP at the iterate, after a change of its
+/// constants.
 pub(in crate::ocp::nlp::ipm) fn evaluate_linear_residuals<T: Real>(iterate: &mut Iterate<'_, T>) {
     T::run_precompiled::<EvaluateLinearResidualsCompiled>(EvaluateLinearResiduals { iterate });
 }
@@ -99,7 +100,7 @@ struct EvaluateLinearResiduals<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
 }
 
-compiled!(/// See [`EvaluateValues`].
+compiled!(/// See [`EvaluateLinearResiduals`].
 EvaluateLinearResidualsCompiled: EvaluateLinearResiduals<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for EvaluateLinearResiduals<'_, '_, T> {
@@ -109,10 +110,10 @@ impl<T: Real> Registers<T> for EvaluateLinearResiduals<'_, '_, T> {
     }
 }
 
-/// A step towards products of slacks and multipliers that are all `μ`.
+/// Factorises, and computes the Newton step towards `s λ = μ`.
 ///
 /// # Errors
-/// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
+/// [`QpError::NotConvex`] if the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
 pub(in crate::ocp::nlp::ipm) fn newton_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
@@ -123,11 +124,11 @@ pub(in crate::ocp::nlp::ipm) fn newton_step<T: Real>(
     solve_newton(iterate, mu, false, true)
 }
 
-/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
-/// that are there.
+/// Computes the step towards `μ` with the same factors; `corrected` adds the products of the
+/// present slack and multiplier steps.
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn resolve<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: T,
@@ -161,7 +162,7 @@ struct NewtonStep<'r, 'a, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`Step`].
+compiled!(/// See [`NewtonStep`].
 NewtonStepCompiled: NewtonStep<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
@@ -178,18 +179,17 @@ impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
     }
 }
 
-/// Solves with the same factors, at most.
+/// The largest number of refinements with the same factors.
 const MAX_REFINEMENTS: usize = 3;
-/// Another one follows where it leaves this part of what equations lack.
+/// Refinement continues while it leaves at most this fraction of the residual of the equations.
 const REFINEMENT_GAIN: f64 = 0.5;
 
-/// What equations give way to their multipliers is taken back: the step is that of the system
-/// without dual regularisation, as far as rounding permits, where the same factors are enough for
-/// that. Each solve begins at the multipliers of the one before (the proximal method of
+/// Iterative refinement: removes the dual regularisation of equations from the step, up to
+/// rounding, with the same factors. Each solve starts from the last multipliers (proximal method of
 /// multipliers).
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     units: &[T],
@@ -208,8 +208,8 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     Ok(())
 }
 
-/// The largest residual of an equation after the full step, in units; zero if none is more than
-/// rounding.
+/// The largest residual of an equation after the full step, in units; zero if all are rounding
+/// errors.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let inequalities = &iterate.sides;
     let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
@@ -231,7 +231,7 @@ struct RefineStep<'r, 'a, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`Refine`].
+compiled!(/// See [`RefineStep`].
 RefineStepCompiled: RefineStep<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for RefineStep<'_, '_, T> {
@@ -242,8 +242,8 @@ impl<T: Real> Registers<T> for RefineStep<'_, '_, T> {
     }
 }
 
-/// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
-/// back bit by bit.
+/// Computes the multipliers `π` after the full step into `work.next_costates`. Restores the point
+/// and its multipliers bit by bit.
 pub(in crate::ocp::nlp::ipm) fn costates_after_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Workspace<'_, T>,
@@ -264,7 +264,7 @@ struct CostatesAfterStep<'r, 'a, 's, T> {
     pi: &'s mut [T],
 }
 
-compiled!(/// See [`After`].
+compiled!(/// See [`CostatesAfterStep`].
 CostatesAfterStepCompiled: CostatesAfterStep<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
@@ -275,16 +275,17 @@ impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
     }
 }
 
-/// The weight of the identity in place of the Hessian in [`least_squares`], in units of forces.
+/// The weight of the identity that replaces the Hessian in [`least_squares_multipliers`], in units
+/// of the objective.
 const IDENTITY_HESSIAN_WEIGHT: f64 = 1e8;
 
-/// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
-/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are
-/// given. These are Newton's equations with a large multiple of the identity for a Hessian, and no
-/// residuals of the constraints (Wächter and Biegler, section 3.6).
+/// Computes least-squares multipliers, which minimise the gradient of the Lagrangian: `π` into
+/// `work.next_costates`, those of general constraints into `work.hessian_multipliers`. The
+/// multipliers of bounds of variables are given. Solves Newton's equations with a large multiple of
+/// the identity as Hessian, and without constraint residuals (Wächter and Biegler, section 3.6).
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Workspace<'_, T>,
@@ -313,7 +314,7 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     Ok(())
 }
 
-/// Sets multipliers of sides of general constraints.
+/// Sets the multipliers of the inequalities of general constraints.
 fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
     let inequalities = &mut iterate.sides;
     let count = inequalities.counts.sides();
@@ -326,7 +327,8 @@ fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn
     }
 }
 
-/// Whether rows, first those of lower and then those of upper sides, belong to general constraints.
+/// For each row of inequalities (lower bounds, then upper bounds): whether it is a general
+/// constraint.
 pub(in crate::ocp::nlp::ipm) fn general_constraint_flags<'a, T: Real>(
     qp: QpView<'a, T>,
     rows: &'a [u32],
@@ -351,7 +353,7 @@ struct LeastSquaresMultipliers<'r, 'a, 's, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`LeastSquares`].
+compiled!(/// See [`LeastSquaresMultipliers`].
 LeastSquaresMultipliersCompiled: LeastSquaresMultipliers<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for LeastSquaresMultipliers<'_, '_, '_, T> {
