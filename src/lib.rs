@@ -218,8 +218,8 @@ pub mod memory {
 
 /// Elementary functions of `f64` and `f32` as methods, for targets without `std`.
 ///
-/// Models import them implicitly. Helper functions outside of a model need `use
-/// casados::scalar::Float as _;`.
+/// Models import them implicitly. Helper functions outside of a model need
+/// `use casados::scalar::Float as _;`.
 pub mod scalar {
     pub use casados_core::scalar::Float;
 }

@@ -66,8 +66,8 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 
-/// The adaptive integrator of the method `B` for the model `M`, with numbers `T`: `Adaptive<Model,
-/// Radau>`.
+/// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
+/// `Adaptive<Model, Radau>`.
 ///
 /// The step size is controlled by an estimate of the local error, weighted with `atol + rtol |x|`.
 /// Derivatives are those of the accepted steps. Methods are [`Radau`], which selects among orders

@@ -53,8 +53,8 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
         step: &AcceptedStep<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
-    /// The derivatives of `Σ_i weight_i k_i` of the last differentiated step with respect to `(x_n,
-    /// u, p)`, one row for each direction.
+    /// The derivatives of `Σ_i weight_i k_i` of the last differentiated step with respect to
+    /// `(x_n, u, p)`, one row for each direction.
     ///
     /// # Errors
     /// [`Error::NoResult`]

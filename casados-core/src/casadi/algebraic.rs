@@ -5,8 +5,8 @@
 //! d(ζ)/dw = ζ_x X + (0, ζ_u, ζ_p)        ∇(νᵀζ) = Dᵀ ∇_(x, u, p)(νᵀζ)        ∇²(νᵀζ) = Dᵀ ∇²_(x, u, p)(νᵀζ) D + terms of ∇²x
 //! ```
 //!
-//! with `X = dx/dw` and `D = (X, (0, I, 0), (0, 0, I))`. The terms of `∇²x` have the multipliers `λ
-//! + ζ_xᵀν` of the state.
+//! with `X = dx/dw` and `D = (X, (0, I, 0), (0, 0, I))`. The terms of `∇²x` have the multipliers
+//! `λ + ζ_xᵀν` of the state.
 
 use super::interval::Consistent;
 use super::second::Blocks;

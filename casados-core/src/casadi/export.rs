@@ -4,8 +4,9 @@
 /// `jac_adj1_name` of a `cdylib`, for `casadi.external("name", "./lib….so")`; see
 /// [`casadi`](crate::casadi).
 ///
-/// The integrator and the length of its interval may be followed, in this order, by `quadrature =
-/// F`, whose integrals are the output `qf`, and by fields of [`Settings`](crate::casadi::Settings).
+/// The integrator and the length of its interval may be followed, in this order, by
+/// `quadrature = F`, whose integrals are the output `qf`, and by fields of
+/// [`Settings`](crate::casadi::Settings).
 ///
 /// ```text
 /// casados::casadi::export! {

@@ -1,8 +1,8 @@
 //! Integrators as external functions of CasADi, in a shared library (feature `casadi`).
 //!
-//! CasADi finds functions of a shared library by their names: `casadi.external("pendulum",
-//! "./libmodel.so")` is an ordinary `casadi.Function` with exact first and second derivatives.
-//! [`export!`] defines them, in a crate of the type `cdylib`:
+//! CasADi finds functions of a shared library by their names:
+//! `casadi.external("pendulum", "./libmodel.so")` is an ordinary `casadi.Function` with exact first
+//! and second derivatives. [`export!`] defines them, in a crate of the type `cdylib`:
 //!
 //! ```text
 //! casados::casadi::export! {

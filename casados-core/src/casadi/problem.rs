@@ -139,8 +139,8 @@ impl Problems {
         Ok(())
     }
 
-    /// The Hessian `σ H(μ/σ)`; for `σ = 0` the part linear in `μ`: `H(μ) − H(0)`, both with `σ =
-    /// 1`. It is stored unless written to `to`.
+    /// The Hessian `σ H(μ/σ)`; for `σ = 0` the part linear in `μ`: `H(μ) − H(0)`, both with
+    /// `σ = 1`. It is stored unless written to `to`.
     fn evaluate_hessian(&self, worker: &mut Worker, to: Option<&mut [f64]>) -> Result<(), OcpError> {
         if worker.known.second && to.is_none() {
             return Ok(());

@@ -6,8 +6,8 @@
 //! - `atan2` divides by the larger argument, so that an argument may be zero;
 //! - `hypot` is scaled by the larger argument;
 //! - `powf` with a constant exponent also takes zero and negative bases to integer powers, and
-//!   rounds once (`num-dual` multiplies `a^(n − 3)` by `a³`); with a variable exponent it is `exp(b
-//!   ln a)`;
+//!   rounds once (`num-dual` multiplies `a^(n − 3)` by `a³`); with a variable exponent it is
+//!   `exp(b ln a)`;
 //! - `powi` of a zero base multiplies: `num-dual` divides by powers of the base.
 
 use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};

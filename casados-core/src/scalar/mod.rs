@@ -65,8 +65,8 @@ pub trait Piece {
 ///
 /// Elementary functions have the meaning of the `f64` methods of the same name.
 pub trait Scalar: Field {
-    /// The representation in memory: the number itself or, for a register of `N` numbers, `[f64;
-    /// N]`.
+    /// The representation in memory: the number itself or, for a register of `N` numbers,
+    /// `[f64; N]`.
     type Cell: Copy + 'static;
 
     /// Loads a number from memory.

@@ -3,9 +3,9 @@
 use super::points::check_slopes;
 use crate::scalar::Scalar;
 
-/// The weights of `[f₀, f₁, f₀′, f₁′]` in a derivative of a cubic piece: of order zero, with `s =
-/// (x − x₀)/h` and `r = 1 − s`, they are `[r² (1 + 2s), s² (3 − 2s), h s r², −h s² r]` (Hermite);
-/// outside they are linear in `x`.
+/// The weights of `[f₀, f₁, f₀′, f₁′]` in a derivative of a cubic piece: of order zero, with
+/// `s = (x − x₀)/h` and `r = 1 − s`, they are `[r² (1 + 2s), s² (3 − 2s), h s r², −h s² r]`
+/// (Hermite); outside they are linear in `x`.
 #[inline(always)]
 pub fn hermite_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
     let c = S::from_f64;

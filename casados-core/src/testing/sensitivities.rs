@@ -23,8 +23,8 @@ use std::vec::Vec;
 
 /// Checks one interval of an integrator:
 /// - repeated calls are bitwise equal, and all calls agree in their common results;
-/// - forward sensitivities agree with differences of the solution, and adjoint ones with both (`λᵀ
-///   (S v) = (Sᵀ λ)ᵀ v` for all `v`);
+/// - forward sensitivities agree with differences of the solution, and adjoint ones with both
+///   (`λᵀ (S v) = (Sᵀ λ)ᵀ v` for all `v`);
 /// - the Hessian is symmetric, and agrees with differences of the gradient.
 ///
 /// The report has a warning if a differential or algebraic state is outside of its `range(..)` of

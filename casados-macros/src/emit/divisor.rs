@@ -47,9 +47,10 @@ pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
 /// `l` has an error of one and a half of its units, the relative error of the sum is 4.5 · 2⁻¹⁰⁴,
 /// and the rounding of `l x` adds 1.5 · 2⁻¹⁰⁴.)
 ///
-/// With the integers `X = x` and `C` of the significant digits a midpoint is `M/2ᵏ`, `k = 53` if `X
-/// ≥ C` and otherwise `k = 54`, and `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`: `2ᵏ X = d`
-/// modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of `2ᵏ`.)
+/// With the integers `X = x` and `C` of the significant digits a midpoint is `M/2ᵏ`, `k = 53` if
+/// `X ≥ C` and otherwise `k = 54`, and `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`:
+/// `2ᵏ X = d` modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of
+/// `2ᵏ`.)
 fn hard_cases(c: f64) -> impl Iterator<Item = f64> {
     let digits = u128::from(c.to_bits() & ((1 << (DIGITS - 1)) - 1) | 1 << (DIGITS - 1));
     let twos = digits.trailing_zeros();

@@ -1,9 +1,9 @@
 //! Arithmetic for derivative code: simplifications that save operations but may round differently,
 //! and selections outside of products.
 //!
-//! The derivative of `if c { √x } else { 0 }` is `if c { w / (2 √x) } else { 0 }`, never `(if c { w
-//! } else { 0 }) / (2 √x)`, which is `0 · ∞` at `x = 0`. A value that is zero in one branch
-//! therefore remains a selection, and products are moved inside.
+//! The derivative of `if c { √x } else { 0 }` is `if c { w / (2 √x) } else { 0 }`, never
+//! `(if c { w } else { 0 }) / (2 √x)`, which is `0 · ∞` at `x = 0`. A value that is zero in one
+//! branch therefore remains a selection, and products are moved inside.
 
 use super::{Binary, Graph, Node, Op, Unary};
 

@@ -1,11 +1,11 @@
 //! The elimination order of the Newton matrix, chosen at compile time.
 //!
-//! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of `f_ẋ ∪ f_x ∪
-//! f_z`, with s×s blocks as entries. If the stages share one Jacobian, block elimination decouples
-//! in the eigenbasis of A: it is the scalar elimination of `f_ẋ + hμ f_x` for every eigenvalue `μ`
-//! of A. Pivots are therefore tested on such complex matrices, at many points of the model and many
-//! values of `hμ`: a pivot has to be acceptable at all of them. Among the acceptable ones the
-//! Markowitz cost decides.
+//! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of
+//! `f_ẋ ∪ f_x ∪ f_z`, with s×s blocks as entries. If the stages share one Jacobian, block
+//! elimination decouples in the eigenbasis of A: it is the scalar elimination of `f_ẋ + hμ f_x` for
+//! every eigenvalue `μ` of A. Pivots are therefore tested on such complex matrices, at many points
+//! of the model and many values of `hμ`: a pivot has to be acceptable at all of them. Among the
+//! acceptable ones the Markowitz cost decides.
 //!
 //! One of the points is at rest: all states are zero. Models often start there, and entries that
 //! vanish there (the sine of an angle) must not be pivots. If the matrix itself is singular at

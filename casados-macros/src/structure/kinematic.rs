@@ -64,8 +64,8 @@ fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinemat
     taken.into_values().collect()
 }
 
-/// The Newton matrix without the equations and the derivatives of kinematic states: by `k_q = c
-/// (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is added to that of `v`.
+/// The Newton matrix without the equations and the derivatives of kinematic states: by
+/// `k_q = c (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is added to that of `v`.
 pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<NewtonEntry>) -> Vec<NewtonEntry> {
     let mut left: BTreeMap<(u32, u32), NewtonEntry> = BTreeMap::new();
     for NewtonEntry { row, column, terms } in positions {

@@ -275,7 +275,8 @@ fn check_length(model: &Model) -> syn::Result<()> {
     Err(syn::Error::new(span, message))
 }
 
-/// For each unknown, whether the Hessian has an entry for it and another unknown at given states.
+/// For each unknown, whether the Hessian has an entry for it and an unknown: the equations are
+/// nonlinear in it for given states.
 fn has_nonlinear_pair(hessian: &[Entry], [nx, end_x, end_z, ..]: [u32; 5]) -> Vec<bool> {
     let unknown = |variable: u32| match variable {
         derivative if derivative < nx => Some(derivative as usize),

@@ -35,7 +35,7 @@ pub struct Pivot {
     pub identity: bool,
 }
 
-/// `casados_core::model::Update`: `true` if the block is empty before.
+/// `casados_core::model::Update`; the block is empty before the `first` one.
 pub struct Update {
     pub block: u32,
     pub first: bool,

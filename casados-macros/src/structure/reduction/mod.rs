@@ -6,9 +6,9 @@
 //! Each is replaced by its highest derivative ([`constraints`]); all states remain, and the lower
 //! derivatives are the invariants. [`rank`] tests the result at sample points.
 //!
-//! With the rates `r_m` of Baumgarte's stabilisation a constraint is replaced by `Π_m (d/dt + r_m)
-//! g` (J. Baumgarte, Stabilization of constraints and integrals of motion in dynamical systems,
-//! 1972).
+//! With the rates `r_m` of Baumgarte's stabilisation a constraint is replaced by
+//! `Π_m (d/dt + r_m) g` (J. Baumgarte, Stabilization of constraints and integrals of motion in
+//! dynamical systems, 1972).
 
 mod constraints;
 mod projection;

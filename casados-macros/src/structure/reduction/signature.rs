@@ -45,8 +45,8 @@ pub fn offsets(rows: &[Row]) -> Option<Offsets> {
     }
 }
 
-/// The row of each column in a highest-value transversal, by the Hungarian method with the costs `1
-/// − σ`: potentials of rows and columns, and shortest augmenting paths.
+/// The row of each column in a highest-value transversal, by the Hungarian method with the costs
+/// `1 − σ`: potentials of rows and columns, and shortest augmenting paths.
 fn transversal(rows: &[Row]) -> Option<Vec<usize>> {
     const NONE: i64 = 1 << 40;
     let count = rows.len();

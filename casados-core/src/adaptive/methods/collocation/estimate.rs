@@ -56,8 +56,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     ///
     /// The start is evaluated only if the difference of the polynomial's `ẋ` and the solution's
     /// there is large: for components that are neither stiff nor oscillating the filter does not
-    /// amplify it, and relative to the user's tolerance it counts at most `tolerance_ratio /
-    /// ORDER_REDUCTION_RATIO` times.
+    /// amplify it, and relative to the user's tolerance it counts at most
+    /// `tolerance_ratio / ORDER_REDUCTION_RATIO` times.
     pub(super) fn max_with_start_estimate(
         &mut self,
         start: &StepContext<'_, M, T>,

@@ -1,8 +1,8 @@
 //! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton iterations, the error
 //! estimate, and the collocation polynomial.
 //!
-//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for `f(ẋ, x, z,
-//! t) = 0`, with unknowns `k_i`, `z_i` instead of increments of `y`.
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for
+//! `f(ẋ, x, z, t) = 0`, with unknowns `k_i`, `z_i` instead of increments of `y`.
 //!
 //! Stages are stored in `G` groups of four, the lanes of common registers; surplus lanes repeat the
 //! last stage.
