@@ -22,8 +22,8 @@
 //! controls the error of the states, not of the integral. Over several intervals with different
 //! controls, the derivatives by all of them are returned besides those of the solution.
 
-mod integral;
 mod chained_integrands;
+mod integral;
 // The derive of `Zeroable` repeats the bounds of `T`.
 #[allow(clippy::multiple_bound_locations)]
 mod least_squares;
