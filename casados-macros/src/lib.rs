@@ -37,21 +37,17 @@ const STACK: usize = 1 << 29;
 ///
 /// | arguments | identified by name, in any order; only those that the model has |
 /// | --- | --- |
-/// | `xdot`, `x`, `z`, `u`, `p`, `t` | derivatives, states, algebraic states, controls, parameters,
-/// time |
+/// | `xdot`, `x`, `z`, `u`, `p`, `t` | derivatives, states, algebraic states, controls, parameters, time |
 /// | types | `f64`, arrays, tuples, nalgebra vectors and matrices, structs |
 /// | result | as many residuals as there are `x` and `z` |
 ///
 /// | attribute | meaning |
 /// | --- | --- |
-/// | `nominal(x = [900.0, 2e6], z = 0.1)` | typical values. Newton's method starts from those of
-/// `z`, which select one of several roots; the default is zero, or the geometric mean of a range
-/// that excludes zero |
+/// | `nominal(x = [900.0, 2e6], z = 0.1)` | typical values; those of `z` are the initial guess of Newton's method and select one of several roots (default: zero, or the geometric mean of a range without zero) |
 /// | `range(z = 1e-3..=10.0)` | range of admissible values |
 /// | `N = [3, 5]` | sizes for which a model with const parameters is generated |
 /// | `name = Type`, `crate = path` | another name of the type; path of casados |
-/// | `index_reduction`, with `(baumgarte = [2.0, 1.0])` or `(projection)` | differentiates
-/// constraints until the model has index 1, and adds a function that returns its invariants |
+/// | `index_reduction`, with `(baumgarte = [2.0, 1.0])` or `(projection)` | differentiates constraints until the model has index 1, and adds a function that returns its invariants |
 ///
 /// On a `mod` the attribute also reads structs, constants and helper functions. The body may be any
 /// computation that can be unrolled at compile time: loops, closures, iterators, generics, `if` and

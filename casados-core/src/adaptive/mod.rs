@@ -79,24 +79,16 @@ use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 /// | call | effect |
 /// | --- | --- |
 /// | [`new`](Integrator::new) | memory on the heap |
-/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time),
-/// [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, initial guess of `ẋ`
-/// and `z` |
-/// | [`set_relative_tolerances`](Integrator::set_relative_tolerances),
-/// [`set_absolute_tolerances`](Integrator::set_absolute_tolerances) | tolerances of individual
-/// states |
-/// | [`control_sensitivities`](Integrator::control_sensitivities) | error control of sensitivities
-/// |
-/// | [`solve`](Integrator::solve), [`solve_at`](Integrator::solve_at) | `x₊`, also with the
-/// solution at given times |
+/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, initial guess of `ẋ` and `z` |
+/// | [`set_relative_tolerances`](Integrator::set_relative_tolerances), [`set_absolute_tolerances`](Integrator::set_absolute_tolerances) | tolerances of individual states |
+/// | [`control_sensitivities`](Integrator::control_sensitivities) | error control of sensitivities |
+/// | [`solve`](Integrator::solve), [`solve_at`](Integrator::solve_at) | `x₊`, also with the solution at given times |
 /// | [`forward`](Integrator::forward) | and derivatives with respect to `(x₀, u, p)` |
 /// | [`adjoint`](Integrator::adjoint) | and gradients of `λᵀx₊` |
 /// | [`hessian`](Integrator::hessian) | and second derivatives |
 /// | [`dense`](Integrator::dense) | the solution within the last interval |
-/// | [`freeze`](Integrator::freeze), [`thaw`](Integrator::thaw) | later calls repeat the same steps
-/// |
-/// | [`times`](Integrator::times), [`statistics`](Integrator::statistics) | the accepted steps, and
-/// their cost |
+/// | [`freeze`](Integrator::freeze), [`thaw`](Integrator::thaw) | later calls repeat the same steps |
+/// | [`times`](Integrator::times), [`statistics`](Integrator::statistics) | the accepted steps, and their cost |
 ///
 /// The default relative tolerance is 1e-6; see [`AdaptiveOptions`]. Units are those of the model.
 ///

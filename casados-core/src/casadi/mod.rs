@@ -15,8 +15,7 @@
 //! | `F` | `x0`, `u`, `p` | `xf`; `zf` with `algebraic = true`; `qf` with `quadrature = F` |
 //! | `jac_F` | and `out_xf` | `∂xf/∂x0`, `∂xf/∂u`, … |
 //! | `adj1_F` | and `adj_xf`, which is `λ` | `∇(λᵀxf)` |
-//! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and its derivative with respect to `λ`, the
-//! transposed Jacobian |
+//! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and its derivative with respect to `λ`, the transposed Jacobian |
 //!
 //! Sparsity patterns are those of the model's graph, propagated over stages and steps. Results for
 //! the last inputs are cached ([`Settings::cache`]): the stages are solved once, for requests in

@@ -28,11 +28,9 @@
 //!
 //! | type | function | derivatives |
 //! | --- | --- | --- |
-//! | [`Linear`] | `(1 − s) fᵢ + s fᵢ₊₁` with `s = (x − xᵢ)/(xᵢ₊₁ − xᵢ)` | the first one jumps at
-//! the points |
+//! | [`Linear`] | `(1 − s) fᵢ + s fᵢ₊₁` with `s = (x − xᵢ)/(xᵢ₊₁ − xᵢ)` | the first one jumps at the points |
 //! | [`Linear2`] | bilinear in each cell | the first ones jump at the lines of the grid |
-//! | [`Spline`] | the cubic spline: natural (minimal `∫ f″² dx` of all functions through the
-//! points), clamped (given slopes at its ends), or not-a-knot | C²; the third one jumps |
+//! | [`Spline`] | the cubic spline: natural (minimal `∫ f″² dx` of all functions through the points), clamped (given slopes at its ends), or not-a-knot | C²; the third one jumps |
 //! | [`Spline2`] | the tensor product of cubic splines, natural or not-a-knot | C² |
 //!
 //! **Extrapolation** is linear in each variable. Natural splines remain C², since `f″ = 0` at their
