@@ -13,7 +13,8 @@ const SWITCH_ERROR_FACTOR: f64 = 6.0;
 /// Minimum ratio of the least relevant error and the noise for the detection of discontinuities,
 /// which resemble rounding errors: relative tolerances of at least 3e-11 in `f64`.
 const MIN_ERROR_TO_NOISE: f64 = 1e4;
-/// A step may still be shortened by this factor after a rejection for a discontinuity.
+/// A discontinuity rejects a step only if a step shorter by this factor is above the resolution of
+/// the time.
 const MIN_DISCONTINUITY_REDUCTION: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {

@@ -78,7 +78,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// Whether `∂f/∂z` becomes singular at the current point and may be the cause of the failure.
+    /// Whether `∂f/∂(ẋ, z)` becomes singular along an algebraic state at the current point, as a
+    /// possible cause of the failure.
     fn singular_algebraic(&self, reason: Refusal) -> Option<Refusal> {
         let possible = matches!(reason, Refusal::Error | Refusal::NotConverged | Refusal::Singular);
         if M::Shape::NZ == 0 || !possible {

@@ -6,8 +6,8 @@ use super::*;
 const MAX_RESIDUAL_RATIO: f64 = 0.1;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// Whether the iteration has converged: the residual is reduced enough for an error `most`
-    /// times the increment.
+    /// Whether the error after the last increment, `rate/(1 − rate)` times the increment, is at
+    /// most `most` times the increment.
     ///
     /// # Errors
     /// [`NewtonFailure::NotFinite`]
