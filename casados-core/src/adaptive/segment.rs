@@ -18,8 +18,7 @@ use bytemuck::Zeroable;
 /// The steps of one interval.
 pub(super) struct Segment<M: Dae, T: Real> {
     pub tape: Tape<T>,
-    /// See
-    /// [`RecordedSteps::steps_were_chosen`](super::sensitivities::RecordedSteps::steps_were_chosen).
+    /// See `RecordedSteps::steps_were_chosen`.
     pub steps_were_chosen: bool,
     pub span: Span<T>,
     /// The interval of the frozen steps, before they are scaled.
