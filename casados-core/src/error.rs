@@ -153,7 +153,7 @@ pub enum Error {
         /// Index of the unknown `(ẋ, z)`, or of the element of the result in column-major order.
         index: usize,
     },
-    /// An integrand has a value that is not finite.
+    /// An integrand, event function or jump has a value that is not finite.
     NonFiniteFunction {
         /// Name of the function.
         function: &'static str,

@@ -66,10 +66,10 @@ impl Default for Options {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// Tolerance of the iteration: it ends when its error is expected to be below this, relative to
-    /// the size of each unknown (for a derivative `ẋ` also below `|x/h|`, the change that rounds to
-    /// zero in `x`). Between zero and 0.1; zero, the default, means rounding: a few units in the
-    /// last place of the number type.
+    /// Tolerance of the iteration: it ends when its predicted error is below this, relative to the
+    /// size of each unknown; for a derivative `ẋ` an error below the rounding of `x/h`, which does
+    /// not change `x`, is also accepted. Between zero and 0.1; zero, the default, means rounding: a
+    /// few units in the last place of the number type.
     pub tolerance: f64,
     /// Maximal number of iterations with a tolerance; more are the error `NotConverged`. Between 1
     /// and 10000; default 50.

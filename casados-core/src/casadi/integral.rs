@@ -1,4 +1,4 @@
-//! Integrals along the solution as a further output.
+//! Integrals along the solution as an additional output.
 
 use super::dependence;
 use super::sparsity::Dependence;
@@ -13,24 +13,24 @@ use core::marker::PhantomData;
 /// The integrals of all outputs of a function, or none.
 #[doc(hidden)]
 pub trait Integral<M: Dae>: 'static {
-    /// How many.
+    /// The number of integrals.
     const COUNT: usize;
-    /// Memory of them.
+    /// Their memory.
     type Memory: Send;
 
-    /// Memory for a thread.
+    /// The memory for a thread.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn memory() -> Result<Self::Memory, Error>;
-    /// What the integrator takes along, with these multipliers.
+    /// The integrand, with these multipliers.
     fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64>;
     /// The values.
     fn value(memory: &Self::Memory) -> &[f64];
-    /// The derivatives by `x₀`, `u` and `p`, each column by column.
+    /// The derivatives with respect to `x₀`, `u` and `p`, each in column-major order.
     fn jacobian(memory: &Self::Memory) -> [&[f64]; 3];
-    /// On which directions the outputs depend (in rows from `first` on), and where the Hessian of
-    /// them has entries, if these are the variables at the stages.
+    /// The directions on which the outputs depend (in rows from `first` on), and the entries of
+    /// their Hessian, given the dependencies of the variables at the stages.
     fn depend(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence);
 }
 
