@@ -1,6 +1,6 @@
 //! The interface of all adaptive methods. Sealed: the traits cannot be named outside of the crate.
 
-use super::replay::{AcceptedStep, DynStepDifferentiator, StepDifferentiator};
+use super::replay::{DynStepDifferentiator, StepDifferentiator, StepRecord};
 use super::step::{AfterStep, Run, Span};
 use super::tape::TapeEntry;
 use crate::error::Error;
@@ -46,7 +46,7 @@ pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error>;
     /// The object that differentiates accepted steps.
-    fn replays(state: &mut Self::State) -> &mut Self::Differentiator;
+    fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator;
 }
 
 /// Differentiates the steps of a method for error control of the sensitivities.
@@ -62,8 +62,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Default for MethodStepDifferentiator<M, B
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> DynStepDifferentiator<M, T> for MethodStepDifferentiator<M, B, T> {
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error> {
-        B::replays(&mut self.method_state).forward(step, None)
+    fn forward(&mut self, step: &StepRecord<'_, M, T>) -> Result<&Forward<M, T>, Error> {
+        B::differentiator(&mut self.method_state).forward(step, None)
     }
 
     fn rate_derivatives(
@@ -72,6 +72,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> DynStepDifferentiator<M, T> for MethodSte
         weights: &[f64],
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        B::replays(&mut self.method_state).slopes(level, weights, to)
+        B::differentiator(&mut self.method_state).slopes(level, weights, to)
     }
 }

@@ -19,7 +19,7 @@ use crate::tableau::Method;
 use alloc::boxed::Box;
 
 /// An accepted step.
-pub struct AcceptedStep<'a, M: Dae, T: Real> {
+pub struct StepRecord<'a, M: Dae, T: Real> {
     /// The start of the step.
     pub start: ModelPoint<'a, M, T>,
     /// The length of the step.
@@ -41,7 +41,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     /// Those of Newton's method.
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error>;
     /// Solves the step and computes its derivatives.
@@ -50,7 +50,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
     /// The derivatives of `Σ_i weight_i k_i` of the last differentiated step with respect to
@@ -70,7 +70,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
@@ -80,7 +80,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>;
@@ -95,7 +95,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
 pub trait DynStepDifferentiator<M: Dae, T: Real>: Send + Sync {
     /// # Errors
     /// Those of Newton's method; a singular matrix.
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
+    fn forward(&mut self, step: &StepRecord<'_, M, T>) -> Result<&Forward<M, T>, Error>;
     /// # Errors
     /// [`Error::NoResult`]
     fn rate_derivatives(
@@ -122,7 +122,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
     /// Prepares the integrator at the start of a step.
     fn prepare_step(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
     ) -> Result<&mut OneStepIntegrator<M, B, T, S>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
@@ -144,7 +144,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for OneMethod<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.prepare_step(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -152,7 +152,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.prepare_step(step)?.forward_refined(step.start.x, step.start.u, step.h, integrand)
@@ -160,7 +160,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -176,7 +176,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -218,7 +218,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         of_level!(self, step.order_index, solve(step, integrand))
@@ -226,7 +226,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         of_level!(self, step.order_index, forward(step, integrand))
@@ -234,7 +234,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -243,7 +243,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {

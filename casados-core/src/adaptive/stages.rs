@@ -74,7 +74,7 @@ pub trait StageSolver<M: Dae, T: Real> {
     fn estimate_error(
         &mut self,
         start: &StepContext<'_, M, T>,
-        again: bool,
+        reevaluate_large_error: bool,
         residuals: &mut usize,
     ) -> Result<f64, NewtonFailure>;
     /// The largest defect at further points of a step in which the model changes its branch,

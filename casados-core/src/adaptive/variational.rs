@@ -19,7 +19,7 @@ use super::error_estimate::RelativeErrors;
 use super::newton_monitor::NewtonFailure;
 use super::pairs::EmbeddedPair;
 use super::point::ModelPoint;
-use super::replay::{AcceptedStep, DynStepDifferentiator};
+use super::replay::{DynStepDifferentiator, StepRecord};
 use super::stages::{FilteredDefect, MAX_STAGES, StageSolver, StepContext};
 use super::tolerances::{Tolerances, root_mean_square};
 use crate::error::Error;
@@ -114,7 +114,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
     }
 
     /// Computes the derivatives at the end of a step.
-    fn differentiate_step(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<(), Error> {
+    fn differentiate_step(&mut self, step: &StepRecord<'_, M, T>) -> Result<(), Error> {
         let (nx, VariationalMemory { start_sensitivities: before, end_sensitivities: after, .. }) =
             (M::Shape::NX, &mut *self.memory);
         let forward = self.differentiator.forward(step)?;
@@ -188,7 +188,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         self.stage_unknowns.clear();
         stages.append_unknowns(&mut self.stage_unknowns);
         let unknowns = core::mem::take(&mut self.stage_unknowns);
-        let taken = self.differentiate_step(&AcceptedStep {
+        let taken = self.differentiate_step(&StepRecord {
             start: at,
             h: start.h,
             stage_unknowns: &unknowns,
@@ -254,7 +254,7 @@ impl<M: Ode, T: Real> Variational<M, T> {
     /// step cannot be differentiated.
     pub fn explicit_error<B: EmbeddedPair<S>, const S: usize>(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         end: &[T],
         inputs: &[T],
         tolerances: impl Iterator<Item = (T, T)> + Clone,

@@ -159,13 +159,13 @@ pub fn release<C: FunctionLibrary>(library: &Library<C>, memory: c_int) {
 }
 
 /// `F_incref`
-pub fn refer<C: FunctionLibrary>(library: &Library<C>) {
-    let _ = catch_unwind(AssertUnwindSafe(|| library.refer()));
+pub fn add_reference<C: FunctionLibrary>(library: &Library<C>) {
+    let _ = catch_unwind(AssertUnwindSafe(|| library.add_reference()));
 }
 
 /// `F_decref`
-pub fn forget<C: FunctionLibrary>(library: &Library<C>) {
-    let _ = catch_unwind(AssertUnwindSafe(|| library.forget()));
+pub fn remove_reference<C: FunctionLibrary>(library: &Library<C>) {
+    let _ = catch_unwind(AssertUnwindSafe(|| library.remove_reference()));
 }
 
 /// The number of intervals integrated since the first reference to the functions, including those

@@ -114,7 +114,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             value.add_row(nx + output, &end, 2 * nx + output);
         }
         dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian);
-        Q::depend(&stages, nx + nz, &mut value, &mut hessian);
+        Q::add_dependence(&stages, nx + nz, &mut value, &mut hessian);
         let outputs = [0..nx, nx..nx + nz, nx + nz..ny];
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
         let shape = signature::Shape { count: 1, inputs, outputs, value: &value, hessian: &hessian };
@@ -161,7 +161,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             integrator.set_parameters(&vector(p))?;
         }
         match tape {
-            Some(tape) => Ok(integrator.restore(tape)?),
+            Some(tape) => Ok(integrator.restore_stages(tape)?),
             None => {
                 self.integrations.fetch_add(1, Ordering::Relaxed);
                 Ok(())
@@ -200,7 +200,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             )?;
             algebraic::add_to_seed(sizes, zeta, nu, seed.as_mut_slice());
             if let Some(tape) = answer.tape.get() {
-                integrator.restore(tape)?;
+                integrator.restore_stages(tape)?;
             }
         }
         // With algebraic states or integrals the outputs are more than the integrator's own
@@ -215,7 +215,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             sizes,
             outputs: if whole { outputs } else { &[] },
         };
-        asked.of(integrator, Q::along(integrals, of_integrals), answer, call)?;
+        asked.of(integrator, Q::integrand(integrals, of_integrals), answer, call)?;
         record_tape(integrator, &mut answer.tape)?;
         if adjoint {
             answer.lambda.set(ny).copy_from_slice(lambda);
@@ -327,7 +327,7 @@ impl<M: Dae> IntervalRequest<'_, M> {
 
 /// Records the stages of the last call, unless they are recorded.
 fn record_tape<I: Interval>(integrator: &mut I, tape: &mut Part<I::Tape>) -> Result<(), CallFailure> {
-    if tape.get().is_none() && !integrator.record(tape.open())? {
+    if tape.get().is_none() && !integrator.record_stages(tape.open())? {
         tape.clear();
     }
     Ok(())
@@ -361,7 +361,11 @@ impl<I: Interval, Q: Integral<I::Model>> FunctionLibrary for Integrators<I, Q> {
             if !p.is_empty() {
                 integrator.set_parameters(&vector(p))?;
             }
-            integrator.choose(&IntervalStart { x0: vector(x0), u: vector(u), h: self.settings.interval })?;
+            integrator.choose_steps(&IntervalStart {
+                x0: vector(x0),
+                u: vector(u),
+                h: self.settings.interval,
+            })?;
         }
         Ok(Worker {
             integrator,
@@ -395,7 +399,7 @@ impl<I: Interval, Q: Integral<I::Model>> FunctionLibrary for Integrators<I, Q> {
             return Ok(());
         }
         // After an error the restored stages must not be used in the next call.
-        self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.forget())?;
+        self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.discard_stages())?;
         let adjoint = wanted.gradient || wanted.hessian;
         let given = ComputedDerivatives {
             jacobian: wanted.jacobian,

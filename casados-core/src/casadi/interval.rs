@@ -35,7 +35,7 @@ pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'st
     ///
     /// # Errors
     /// Those of the integrator.
-    fn choose(&mut self, at: &IntervalStart<Self::Model>) -> Result<(), Error> {
+    fn choose_steps(&mut self, at: &IntervalStart<Self::Model>) -> Result<(), Error> {
         let _ = at;
         Ok(())
     }
@@ -62,17 +62,17 @@ pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'st
     ///
     /// # Errors
     /// [`Error::NoResult`]
-    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+    fn record_stages(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         let _ = tape;
         Ok(false)
     }
     /// Discards restored stages after an error.
-    fn forget(&mut self) {}
+    fn discard_stages(&mut self) {}
     /// Restores stages: the next call only differentiates them.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+    fn restore_stages(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         let _ = tape;
         Ok(())
     }
@@ -111,14 +111,14 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     }
 
     const RECORDS: bool = true;
-    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+    fn record_stages(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         tape.resize(self.options().steps, Zeroable::zeroed());
         self.copy_stages(tape).map(|()| true)
     }
-    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+    fn restore_stages(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         self.set_solution(tape)
     }
-    fn forget(&mut self) {
+    fn discard_stages(&mut self) {
         self.reset();
     }
 
@@ -173,7 +173,7 @@ where
     fn depth(_: &AdaptiveOptions) -> Option<usize> {
         None
     }
-    fn choose(&mut self, at: &IntervalStart<M>) -> Result<(), Error> {
+    fn choose_steps(&mut self, at: &IntervalStart<M>) -> Result<(), Error> {
         self.solve(&at.x0, &at.u, at.h)?;
         self.freeze()
     }

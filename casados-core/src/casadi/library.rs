@@ -100,12 +100,12 @@ impl<C: FunctionLibrary> Library<C> {
     }
 
     /// Adds a reference to the functions.
-    pub fn refer(&self) {
+    pub fn add_reference(&self) {
         self.state().references += 1;
     }
 
     /// Removes a reference; the last one drops everything.
-    pub fn forget(&self) {
+    pub fn remove_reference(&self) {
         let mut state = self.state();
         state.references = state.references.saturating_sub(1);
         if state.references == 0 {

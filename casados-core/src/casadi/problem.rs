@@ -50,7 +50,7 @@ pub struct Worker {
     input_multipliers: Vec<f64>,
     known: PointCache,
     /// Whether derivatives were requested at the last point with requested values.
-    follows: bool,
+    derivatives_requested: bool,
     objective: f64,
     ends: Vec<f64>,
     gradient: Vec<f64>,
@@ -58,7 +58,7 @@ pub struct Worker {
     /// The upper triangle of the Hessian.
     hessian: Vec<f64>,
     /// Memory for a point, and for multipliers divided by `σ`.
-    room: Trial,
+    trial_point: Trial,
     scaled: Vec<f64>,
 }
 
@@ -105,20 +105,20 @@ impl Problems {
         if worker.known.value {
             return Ok(());
         }
-        if worker.follows {
+        if worker.derivatives_requested {
             self.first(worker)?;
             // Reset until derivatives are requested.
-            worker.follows = false;
+            worker.derivatives_requested = false;
             return Ok(());
         }
         self.prepare_intervals(worker.program.as_mut(), false);
-        worker.objective = worker.program.value(&worker.v, &mut worker.room, &mut worker.ends)?;
+        worker.objective = worker.program.value(&worker.v, &mut worker.trial_point, &mut worker.ends)?;
         worker.known.value = true;
         Ok(())
     }
 
     fn first(&self, worker: &mut Worker) -> Result<(), OcpError> {
-        worker.follows = true;
+        worker.derivatives_requested = true;
         if worker.known.first {
             return Ok(());
         }
@@ -221,13 +221,13 @@ impl FunctionLibrary for Problems {
             multipliers: vec![f64::NAN; m + 1],
             input_multipliers: vec![0.0; m + 1],
             known: PointCache::default(),
-            follows: false,
+            derivatives_requested: false,
             objective: 0.0,
             ends: Vec::new(),
             gradient: vec![0.0; n],
             jacobian: vec![0.0; self.transposed.len()],
             hessian: vec![0.0; self.layout.upper.sparsity.entries().len()],
-            room: Solution::new(&self.layout.dims).map_err(|error| CallFailure(error.to_string()))?,
+            trial_point: Solution::new(&self.layout.dims).map_err(|error| CallFailure(error.to_string()))?,
             scaled: Vec::new(),
         })
     }

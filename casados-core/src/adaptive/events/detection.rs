@@ -6,7 +6,7 @@ use super::event_function::EventFunctionPoint;
 use super::{Event, EventLinearisation, Hybrid};
 use crate::adaptive::engine::Engine;
 use crate::adaptive::point::{ModelPoint, write_inputs};
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::segment::push_segment;
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
@@ -252,7 +252,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let x = self.step_end(k, step, h)?;
         let end = entry.t + h;
         if let Some(segment) = self.segments.get_mut(k) {
-            let stages = B::replays(&mut self.integrator.method_state).stages(entry.order_index)?;
+            let stages = B::differentiator(&mut self.integrator.method_state).stages(entry.order_index)?;
             segment.tape.replace_last_step(h, M::Shape::NX, stages);
             segment.span.end = end;
         }
@@ -270,14 +270,14 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.step_numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = ModelPoint { x: &x, u: &segment.u, p: &integrator.workspace.parameters, t: entry.t };
-        let taken = AcceptedStep {
+        let taken = StepRecord {
             start: at,
             h,
             stage_unknowns: y,
             order_index: entry.order_index,
             stages_are_solved: false,
         };
-        Ok(B::replays(&mut integrator.method_state).solve(&taken, None)?.x)
+        Ok(B::differentiator(&mut integrator.method_state).solve(&taken, None)?.x)
     }
 
     /// The consistent `(ẋ, z)` at a state.

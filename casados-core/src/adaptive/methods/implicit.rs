@@ -51,7 +51,7 @@ impl<M: Dae, B: MethodFamily, T: Real> Engine<M, T> for B {
         interpolate_step(stages, x, y, t - entry.t, entry.h, dense)
     }
 
-    fn replays(state: &mut Self::State) -> &mut Self::Differentiator {
+    fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator {
         &mut state.differentiator
     }
 }

@@ -15,7 +15,7 @@ use step_errors::with_step_number;
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::engine::Engine;
 use crate::adaptive::point::ModelPoint;
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::step::{Span, Workspace};
 use crate::adaptive::tape::Tape;
 use crate::error::Error;
@@ -74,7 +74,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
             &mut B::Differentiator,
-            &AcceptedStep<'_, M, T>,
+            &StepRecord<'_, M, T>,
             usize,
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
@@ -90,7 +90,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         self.tape.begin_replay();
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
-            let replays = B::replays(state);
+            let replays = B::differentiator(state);
             let (start, y) = self.tape.step_numbers(step, M::Shape::NX);
             if self.steps_were_chosen {
                 for (x, start) in x.as_mut_slice().iter_mut().zip(start) {
@@ -98,7 +98,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 }
             }
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -226,7 +226,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -234,7 +234,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 stages_are_solved: true,
             };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let local = B::replays(state).adjoint(&taken, now, dyn_integrand(&mut backwards));
+            let local = B::differentiator(state).adjoint(&taken, now, dyn_integrand(&mut backwards));
             let local = local.map_err(|error| with_step_number(error, step))?;
             now.as_mut_slice().copy_from_slice(local.grad_x0.as_slice());
             let parts = local.grad_u.as_slice().iter().chain(local.grad_p.as_slice());
@@ -285,7 +285,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -293,7 +293,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 stages_are_solved: true,
             };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let second = B::replays(state).hessian(&taken, now, dyn_integrand(&mut backwards));
+            let second = B::differentiator(state).hessian(&taken, now, dyn_integrand(&mut backwards));
             let second = second.map_err(|error| with_step_number(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());

@@ -222,12 +222,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             BranchChange::Switch => SWITCH_ERROR_FACTOR * *tolerance_ratio,
             BranchChange::SplineKnot => over_knot,
         };
-        let rough = factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
+        let discontinuity_error =
+            factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
         // If a derivative jumps, the error is proportional to the fourth or a lower power of the
         // step size. A step at the resolution of the time is accepted.
-        let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
+        let factor = (0.9 * Scalar::powf(discontinuity_error, -0.25)).clamp(0.1, 0.9);
         let shorter = state.h * T::from_f64(MIN_DISCONTINUITY_REDUCTION * factor);
-        if rough >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
+        if discontinuity_error >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
             return Err(NewtonFailure::Discontinuity(factor));
         }
         Ok(())

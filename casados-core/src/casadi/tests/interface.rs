@@ -79,7 +79,7 @@ fn call(library: &Library<SumLibrary>, inputs: [Option<&[f64]>; 2], id: i32) -> 
 fn pointers_become_calls() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
     static LIBRARY: Library<SumLibrary> = Library::new(|| Ok(SumLibrary::new(&WORKERS)));
-    ffi::refer(&LIBRARY);
+    ffi::add_reference(&LIBRARY);
     let id = ffi::check_out(&LIBRARY);
     let (a, b) = ([1.0, 2.0, 3.0], [10.0]);
     assert_eq!(call(&LIBRARY, [Some(&a), Some(&b)], id), Some(([11.0, 12.0, 13.0], [6.0])));
@@ -111,7 +111,7 @@ fn pointers_become_calls() {
     assert_eq!(call(&LIBRARY, [Some(&a), None], id), None);
     // The last reference drops everything.
     assert_eq!(WORKERS.load(Ordering::Relaxed), 1);
-    ffi::forget(&LIBRARY);
+    ffi::remove_reference(&LIBRARY);
     assert_eq!(WORKERS.load(Ordering::Relaxed), 0);
 }
 

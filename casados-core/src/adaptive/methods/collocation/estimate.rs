@@ -76,8 +76,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         }
         let unfiltered = self.scheme.basis.eigenvalues().scaled(start.h).get(0).0.to_f64().abs()
             * norm(&changes.as_ref()[..nx], start.estimator_scale.as_ref());
-        let undoubted = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
-        if unfiltered <= 2.0 * error.max(undoubted) {
+        let safe_estimate = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
+        if unfiltered <= 2.0 * error.max(safe_estimate) {
             return Ok(error);
         }
         let at_end = self.memory.error_estimate;

@@ -7,7 +7,7 @@ mod stepper;
 use crate::adaptive::engine::{Engine, MethodState};
 use crate::adaptive::pairs::EmbeddedPair;
 use crate::adaptive::point::ModelPoint;
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::step::{AcceptedStepOutput, AfterStep, Run, Span, Workspace};
 use crate::adaptive::step_size::{ExplicitStep, PiController, first_step_size};
 use crate::adaptive::tape::TapeEntry;
@@ -62,7 +62,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
     }
 
     /// Prepares the fixed-step integrator at the start of a step.
-    fn prepare_replay(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+    fn prepare_replay(&mut self, step: &StepRecord<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
         let erk = self.fixed_step_erk()?;
         if M::Shape::NP > 0 {
             erk.set_parameters(step.start.p)?;
@@ -75,7 +75,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
 impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.prepare_replay(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -83,7 +83,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.prepare_replay(step)?.forward_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -91,7 +91,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -106,7 +106,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -275,7 +275,7 @@ fn attempt_step<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
         Some(sensitivities) if error <= 1.0 => {
             let Workspace { point, u, parameters, tolerances: Tolerances { rtol, atol, .. }, .. } =
                 &*run.workspace;
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: ModelPoint { x, u, p: parameters, t },
                 h,
                 stage_unknowns: &[],
@@ -370,7 +370,7 @@ macro_rules! explicit {
                 step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
             }
 
-            fn replays(state: &mut Self::State) -> &mut Self::Differentiator {
+            fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator {
                 state
             }
         })*
