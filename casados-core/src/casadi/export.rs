@@ -196,11 +196,11 @@ macro_rules! __casadi_function {
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_incref"))]
             extern "C" fn incref() {
-                ffi::refer(&$library);
+                ffi::add_reference(&$library);
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_decref"))]
             extern "C" fn decref() {
-                ffi::forget(&$library);
+                ffi::remove_reference(&$library);
             }
         };
     };
