@@ -1,4 +1,4 @@
-//! What solvers ask of phases: each answers for its stages, and links for what is between them.
+//! The program of joined phases: each phase provides its stages, links the steps between phases.
 
 use super::link::{Link, PhaseEnd};
 use super::phase::{Kind, Phase, PhaseSize, PhaseStart};
@@ -19,7 +19,8 @@ use crate::qp::{
 use crate::scalar::Real;
 use core::ops::Range;
 
-/// What the curvature of [`Phases`] is of: of the dynamics of each phase.
+/// The type of dynamics that a [`Curvature`] of [`Phases`] is generic over; each phase linearises
+/// its own.
 ///
 /// No value has this type.
 ///
@@ -58,8 +59,8 @@ curvatures! {
     f32, GaussNewton, false;
 }
 
-/// Of these numbers alone: whoever had numbers of one's own could make a formulation of phases, and
-/// every formulation is a program.
+/// For `f64` and `f32` only: with a generic number this implementation would conflict with that for
+/// every [`Formulation`](crate::ocp::Formulation).
 macro_rules! programs {
     ($($number:ty),*) => {$(
         impl Program<$number> for Phases<'_, $number> {
@@ -111,10 +112,10 @@ macro_rules! programs {
                 ends: &mut [$number],
             ) -> Result<$number, OcpError> {
                 let length = intervals_end(ocp.qp.dims());
-                ocp.problem.stages(ocp.step_length);
+                ocp.problem.stage_residuals(ocp.step_length);
                 let objective =
                     ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())?;
-                ocp.stage_residuals = ocp.problem.stages(ocp.step_length);
+                ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
                 Ok(objective)
             }
 
@@ -149,7 +150,7 @@ macro_rules! programs {
                     Some(phase.problem.derivative(error)?.in_phase(index))
                 };
                 ocp.problem.phases.iter().enumerate().find_map(of_phase).or_else(|| {
-                    // What no phase has is of a link.
+                    // A non-finite number in no phase belongs to a link.
                     let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
                     let (index, phase) = ocp.problem.at(stage)?;
                     let function = phase.link.as_ref()?.name();
@@ -163,7 +164,7 @@ macro_rules! programs {
                 asks: bool,
             ) -> (bool, Option<(ConstraintName, f64)>) {
                 let Ocp { problem, iterate, step_length, .. } = ocp;
-                problem.stages(*step_length);
+                problem.stage_residuals(*step_length);
                 problem.load(iterate.stages());
                 let (mut is_convex, mut worst) = (true, None);
                 for (index, phase) in problem.phases.iter_mut().enumerate() {
@@ -183,26 +184,27 @@ macro_rules! programs {
 
 programs!(f64, f32);
 
-/// Writes the QP at the iterate, and the objective.
+/// Writes the QP at the iterate, and returns the objective.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
     kind: Kind,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
-    ocp.problem.stages(ocp.step_length);
+    ocp.problem.stage_residuals(ocp.step_length);
     let mut objective = T::ZERO;
     for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
         objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
     }
     ocp.objective = objective;
-    ocp.stage_residuals = ocp.problem.stages(ocp.step_length);
+    ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
     let Ocp { problem, qp, iterate, data, .. } = ocp;
     let rows = 2 * qp.dims().iter().map(|stage| stage.ng).sum::<usize>();
     let scratch = data.as_mut().get_mut(rows..).unwrap_or_default();
     problem.write_qp(qp, iterate, scratch, kind)
 }
 
-/// Ends of the intervals of a phase, with its parameters as states that stay, and its constraints.
+/// Writes the ends of the intervals of a phase, with its parameters as constant states, and its
+/// constraints.
 fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
     let PhaseSize { nx, free, intervals, .. } = size;
     let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
@@ -215,7 +217,7 @@ fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [
 }
 
 impl<T: Real> JoinedPhase<'_, T> {
-    /// Where the next phase begins: what the link makes of the end, and what is decided there.
+    /// Writes the start of the next phase: the states by the link, and the decided variables.
     fn write_start(
         &mut self,
         trial: &TrialPoint<T>,
@@ -232,8 +234,8 @@ impl<T: Real> JoinedPhase<'_, T> {
     }
 }
 
-/// Where the next phase begins in the QP, at the last stage of a phase and its point `v` with
-/// multipliers `pi`.
+/// Writes the link to the QP at the last stage of a phase, at its point `v` with the multipliers
+/// `pi`.
 fn write_link_to_qp<T: Real>(
     link: &mut dyn Link<T>,
     end: PhaseEnd<'_, T>,
@@ -255,7 +257,7 @@ fn write_link_to_qp<T: Real>(
     let variable_count = size.nx + size.free;
     stage_conversion::write_start_columns(begin, [size.nx, variable_count], columns, ld);
     if exact {
-        // The gradient of what is quadratic is `∇f − H v`: with another `H`.
+        // The gradient at zero is `∇f − H v`; it changes with `H`.
         add_symmetric(gradient, hessian, ld, v, n);
         let mut terms = QuadraticTerms { free: end.free, gradient: &mut [], hessian, ld };
         link.add_hessian(end, part(pi, 0, next.given_states), &mut terms);
@@ -269,14 +271,14 @@ fn write_link_to_qp<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
-    /// How far stages that are variables go where intervals are evaluated next, and what was left
-    /// of their equations: the sum, and the largest.
-    fn stages(&mut self, step_length: Option<T>) -> [T; 2] {
-        let stages = self.phases.iter_mut().map(|phase| phase.problem.stages(step_length));
+    /// Sets the step length of lifted stages for the next evaluation; returns the sum and the
+    /// largest of the residuals of their equations.
+    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2] {
+        let stages = self.phases.iter_mut().map(|phase| phase.problem.stage_residuals(step_length));
         stages.fold([T::ZERO; 2], add_stage_residuals)
     }
 
-    /// The part of each phase in a vector over the last_stage, as a point that is tried.
+    /// Loads the stages of each phase as its trial point.
     fn load_trials<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut previous_stage = stages.next();
         for (phase, trial) in self.phases.iter().zip(&mut self.trial_points) {
@@ -285,8 +287,10 @@ impl<T: Real> Phases<'_, T> {
         }
     }
 
+    /// Runs a function for each phase and its trial point.
+    ///
     /// # Errors
-    /// The first of a phase, with its number.
+    /// The first error of a phase, with its number.
     fn each_phase(
         &mut self,
         mut run: impl FnMut(&mut dyn Phase<T>, &TrialPoint<T>) -> Result<(), OcpError>,
@@ -297,7 +301,8 @@ impl<T: Real> Phases<'_, T> {
         Ok(())
     }
 
-    /// The objective at some point; in `ends` the ends of all intervals, and constraints.
+    /// Returns the objective at a point; writes the ends of all intervals, then constraints, to
+    /// `ends`.
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         trial_point: &Solution<T, D, M>,
@@ -325,7 +330,7 @@ impl<T: Real> Phases<'_, T> {
         Ok(objective)
     }
 
-    /// The QPs of all phases as that of the whole, with the links between them.
+    /// Writes the QPs of all phases, with the links between them, to the QP of the joined problem.
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: &mut Qp<T, D, M>,
@@ -346,24 +351,34 @@ impl<T: Real> Phases<'_, T> {
         for (index, JoinedPhase { problem, link, begin: phase, next, .. }) in
             self.phases.iter_mut().enumerate()
         {
-            for (from, at) in problem.qp().stages().zip(problem.iterate().stages()) {
+            for (from, stage_point) in problem.qp().stages().zip(problem.iterate().stages()) {
                 let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
                 let mut arrays = to.arrays();
                 stage_conversion::copy_stage_qp(phase.size, &from, &mut arrays);
                 let v = part(v, begin, arrays.ld);
                 begin += arrays.ld;
-                // The last stage of a phase leads nowhere in its variable_count QP.
-                if let (Some(next), Some(link), true) = (&*next, &mut *link, at.dynamics.is_empty()) {
-                    let (end, sizes, at) = (problem.phase_end(at), (phase.size, next), (v, point.dynamics));
-                    write_link_to_qp(link.as_mut(), end, sizes, &mut arrays, at, scratch, kind)
-                        .map_err(|error| error.in_phase(index))?;
+                // In the QP of a phase its last stage has no dynamics.
+                if let (Some(next), Some(link), true) = (&*next, &mut *link, stage_point.dynamics.is_empty())
+                {
+                    let (end, sizes, point_and_costates) =
+                        (problem.phase_end(stage_point), (phase.size, next), (v, point.dynamics));
+                    write_link_to_qp(
+                        link.as_mut(),
+                        end,
+                        sizes,
+                        &mut arrays,
+                        point_and_costates,
+                        scratch,
+                        kind,
+                    )
+                    .map_err(|error| error.in_phase(index))?;
                 }
             }
         }
         Ok(())
     }
 
-    /// A constraint of the QP by its name in its phase.
+    /// Returns the name of a constraint of the QP in its phase.
     fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
         let unnamed = (Part::Dimensions, "");
         let find_name = || {
