@@ -3,7 +3,10 @@
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::of_tolerance;
 use crate::ocp::formulation::error::OcpError;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
+
+/// IPOPT's `slack_move`, as a power of the accuracy of numbers.
+const SLACK_MOVE: f64 = 0.75;
 
 /// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
@@ -44,7 +47,8 @@ pub struct IpmOptions {
     /// What it follows. Default [`Barrier::Adaptive`].
     pub barrier: Barrier,
     /// Bounds are left by this at the start, relative to their size and to the room between them;
-    /// at most 0.5. Default 1e-2.
+    /// at most 0.5. A push below IPOPT's `slack_move`, `ε^(3/4)` (1.8e-12; 6.4e-6 in single
+    /// precision), is that. Default 1e-2.
     pub bound_push: f64,
     /// Whether constants of the algorithm are multiples of units, found where a run begins. That of
     /// forces is
@@ -106,6 +110,13 @@ impl IpmOptions {
     /// The tolerance, or what the last barrier parameter leaves, in units of forces.
     pub(super) fn least_error(&self, force: f64) -> f64 {
         (self.tolerance * of_tolerance(force)).max(10.0 * self.final_mu) / force
+    }
+
+    /// How far bounds are left at the start. A slack of less than `slack_move`, `ε^(3/4)`, is
+    /// smaller than what rounding leaves of a step along its bound, and lets no step go far enough.
+    pub(super) fn push<T: Real>(&self, warm: bool) -> T {
+        let push = if warm { self.warm_push } else { self.bound_push };
+        T::from_f64(push.max(Scalar::powf(T::EPSILON, SLACK_MOVE)))
     }
 
     /// The first barrier parameter.

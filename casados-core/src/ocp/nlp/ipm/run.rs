@@ -119,7 +119,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         (ocp.step_length, ocp.has_algebraic) = (None, false);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && (state.has_tightened || state.best_residual <= self.options.acceptable_tolerance) {
+        if stuck && state.best_residual <= self.options.acceptable_tolerance {
             outcome.status = Status::Acceptable;
         }
         ocp.complete(&mut outcome);
@@ -145,7 +145,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             lengths.sizes = ocp.find_units(work.units, work.scratch);
             capacity.sizes = lengths.sizes;
         }
-        let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
+        let push = self.options.push::<T>(self.options.warm_start);
         let (qp, iterate) = ocp.qp_and_iterate();
         self.trial.copy_from(iterate);
         push_inside(qp, lengths.fixed, push, work.units, &mut iterate.view_mut());
