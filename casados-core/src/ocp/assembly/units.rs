@@ -48,6 +48,14 @@ pub(in crate::ocp) fn of_tolerance(unit: f64) -> f64 {
     unit.min(1.0).max(unit / WIDE)
 }
 
+/// The unit of products of slacks and multipliers at the end of a run, in an objective of this size:
+/// their sum is what that is from its minimum. It is no more than the unit of forces, in which the
+/// unit of a variable is a factor, however far away its origin is, and no less than one where that
+/// is larger.
+pub(in crate::ocp) fn unit_of_products(objective: f64, force: f64) -> f64 {
+    if objective.is_finite() { objective.abs().clamp(force.min(1.0), force) } else { force }
+}
+
 /// The least and the largest of the sizes that something may have.
 #[derive(Clone, Copy)]
 struct Range {
@@ -93,11 +101,23 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let last = span.end.saturating_sub(1);
             let (path, terminal) = (span.start..last, last..span.end);
             let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
+            // Zero where nothing is known of a state.
             for i in 0..nx + nu {
                 // Controls of the last stage are those that all stages share, or others.
                 let is_one = i < nx || is_marked(qp.shared(), i - nx);
                 let stages = if is_one { span.clone() } else { path.clone() };
                 units_of_variable(qp, v, (stages, i), rows);
+            }
+            for _ in 0..nx {
+                let reached = (0..nx).map(|i| units_of_reached_state(qp, (span.clone(), i), rows));
+                if !reached.fold(false, |any, one| any | one) {
+                    break;
+                }
+            }
+            for place in Places::<T>::new(qp.dims).filter(|place| span.contains(&place.stage)) {
+                for unit in part_mut(rows, place.row, place.nx).iter_mut().filter(|unit| **unit == T::ZERO) {
+                    *unit = T::ONE;
+                }
             }
             let of_last = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..of_last).filter(|&j| !is_marked(qp.shared(), j)) {
@@ -116,19 +136,21 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
     /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
-    /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
-    /// residual in units of forces that is asked for.
+    /// `r` is large at the guess, and one at a solution nearby. With units of rows, the least
+    /// residual in units of forces that is asked for, and whether what forces change by counts,
+    /// too, whose rounding errors gradients have.
     pub(in crate::ocp) fn smaller_force(
         &self,
         rows: &[T],
         force: f64,
-        least: f64,
+        (least, counts_changes): (f64, bool),
         scratch: &mut [T],
     ) -> Option<f64> {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
-        let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
-        let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * force);
+        let [slope, change] = slopes_and_changes(qp, v, rows, scratch).map(T::to_f64);
+        let size = slope.max(self.objective.abs().to_f64()).max(1.0);
+        let terms = if counts_changes { force.max(change) } else { force };
+        let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * terms);
         (smaller * WIDE < force).then_some(smaller)
     }
 
@@ -163,6 +185,19 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         LAST_DIGITS * T::EPSILON * largest.to_f64()
     }
+
+    /// What rounding leaves of stationarity: the last digits of the largest product of a curvature
+    /// and a variable of the iterate.
+    pub(in crate::ocp) fn rounding_of_forces(&self) -> f64 {
+        let ((v, _), mut largest) = (self.iterate.variables_and_costates(), T::ZERO);
+        for (place, stage) in Places::<T>::new(self.qp.dims()).zip(self.qp().stages()) {
+            let curvatures = stage.arrays().hessian.iter().step_by(place.ld + 1);
+            for (&curvature, &v) in curvatures.zip(part(v, place.v, place.n)) {
+                largest = largest.max((curvature * v).abs());
+            }
+        }
+        LAST_DIGITS * T::EPSILON * largest.to_f64()
+    }
 }
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
@@ -191,10 +226,39 @@ fn units_of_variable<T: Real>(
     if range.most > 0.0 || guess > T::ONE {
         range.add(guess);
     }
-    let unit = range.unit_far_from_one();
+    let is_state = places().next().is_some_and(|place| i < place.nx);
+    let unit = if is_state && range.most == 0.0 { T::ZERO } else { range.unit_far_from_one() };
     for place in places() {
         set(units, place.row + i, unit);
     }
+}
+
+/// A state without bounds and guess is as large as what leads to it in an interval; whether it has
+/// a unit by now.
+fn units_of_reached_state<T: Real>(
+    qp: QpView<'_, T>,
+    (stages, i): (Stages<usize>, usize),
+    units: &mut [T],
+) -> bool {
+    let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.nx);
+    if places().any(|place| at(units, (place.row + i) as u32) > T::ZERO) {
+        return false;
+    }
+    let mut range = Range::EMPTY;
+    for (place, stage) in
+        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage) && i < p.next)
+    {
+        let column = part(stage.arrays().matrix, i * place.ld, place.ld);
+        let terms = column.iter().zip(part(units, place.row, place.n));
+        range.add(terms.fold(T::ZERO, |most, (&a, &unit)| (a * unit).abs().max(most)));
+    }
+    if range.most == 0.0 {
+        return false;
+    }
+    range.least = range.most;
+    let unit = range.unit_far_from_one();
+    places().for_each(|place| set(units, place.row + i, unit));
+    true
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.

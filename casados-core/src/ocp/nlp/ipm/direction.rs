@@ -78,7 +78,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         row: &mut Iteration,
     ) -> Result<bool, QpError> {
         let force = state.lengths.sizes.force;
-        let least = force * barrier::least(self.options.least_error(force));
+        let least = barrier::least(self.options.least_product(state.objective_unit));
         let units = Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units;
         let mut iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = units;

@@ -100,12 +100,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ends, &state.capacity, self.work.as_mut());
         let of_stages = if P::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
-        let Relative { barrier, error, others } =
-            relative(&residuals, &iterate, view.dynamics, units, of_stages);
-        state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
+        state.measure_objective(objective);
+        let relative =
+            relative(&residuals, &iterate, view.dynamics, (units, state.objective_unit), of_stages);
+        state.update_barrier(&iterate, &relative, &self.options);
+        let Relative { barrier: (barrier, _), error, others } = relative;
         state.judge(error, others, &self.options);
-        state.gaps = barrier.0.dynamics;
-        state.violation = nan_max(state.gaps, barrier.0.inequalities);
+        state.gaps = barrier.dynamics;
+        state.violation = nan_max(state.gaps, barrier.inequalities);
         let is_alone = state.lengths.alone;
         if is_alone {
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
@@ -173,16 +175,20 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
         let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
+        let force = state.lengths.sizes.force;
+        let (slope, terms) = measure::slope(&iterate, state.mu, work.scratch);
         let expected = FilterModel {
             here,
-            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
+            slope: slope / force,
+            // Of the function and of the point.
+            noise: 10.0 * f64::EPSILON * (here.objective.abs() + terms / force),
             small_violation: state.small_violation,
             most: (GROWTH * here.violation.min(first)).max(first),
             mu: state.mu,
             delta: state.delta,
             rounding,
         };
-        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
+        let tau = barrier::fraction_to_boundary(state.mu / force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
@@ -335,9 +341,8 @@ where
         state.count_stalled(row.step);
         state.regularisation.gone(row.step / direction.primal);
         self.accept(ocp, state, &direction, accepted)?;
-        let force = of_tolerance(state.lengths.sizes.force);
-        let least = (self.options.tolerance * force).max(self.options.final_mu);
-        let ends = direction.tiny && state.mu <= least;
+        let least = self.options.tolerance * of_tolerance(state.objective_unit);
+        let ends = direction.tiny && state.mu <= least.max(self.options.final_mu);
         Ok(ends.then_some(Status::NoProgress))
     }
 

@@ -28,6 +28,8 @@ pub(super) struct FilterModel {
     pub here: Measure,
     /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
+    /// What rounding leaves of a difference of barrier functions.
+    pub noise: f64,
     /// `θ_min`: below this violation the barrier function may decide.
     pub small_violation: f64,
     /// No step leaves more violation.
@@ -62,18 +64,17 @@ impl FilterModel {
 
     /// Whether neither the violation nor the barrier function changes by more than rounding errors:
     /// the step changes multipliers.
-    fn is_rounding(&self, there: &Measure, noise: f64) -> bool {
+    fn is_rounding(&self, there: &Measure) -> bool {
         self.here.violation <= self.rounding
             && there.violation <= self.rounding
-            && (there.objective - self.here.objective).abs() <= noise
+            && (there.objective - self.here.objective).abs() <= self.noise
     }
 
     /// Whether a point after a step of this length is good enough; the filter grows where the
     /// barrier function does not decide.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
-        // What rounding leaves of a difference of barrier functions.
-        let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
-        if self.is_rounding(there, noise) {
+        let noise = self.noise;
+        if self.is_rounding(there) {
             return true;
         }
         if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {

@@ -107,9 +107,10 @@ impl IpmOptions {
         }
     }
 
-    /// The tolerance, or what the last barrier parameter leaves, in units of forces.
-    pub(super) fn least_error(&self, force: f64) -> f64 {
-        (self.tolerance * of_tolerance(force)).max(10.0 * self.final_mu) / force
+    /// What products of slacks and multipliers have to be below, by the unit of the objective, or
+    /// what the last barrier parameter leaves of them.
+    pub(super) fn least_product(&self, objective: f64) -> f64 {
+        (self.tolerance * of_tolerance(objective)).max(10.0 * self.final_mu)
     }
 
     /// How far bounds are left at the start. A slack of less than `slack_move`, `ε^(3/4)`, is

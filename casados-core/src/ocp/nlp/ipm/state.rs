@@ -4,7 +4,9 @@ use super::IpmOptions;
 use super::barrier::{self, Barrier, Progress};
 use super::kkt::lengths::Lengths;
 use super::kkt::regularisation::Regularisation;
+use super::kkt::scaling::Relative;
 use super::violations::Phase;
+use crate::ocp::assembly::units::unit_of_products;
 use crate::ocp::nlp::filter::Filter;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
@@ -71,6 +73,8 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub is_linearised: bool,
     /// Whether the filter has the bound of violations that belongs to these slacks.
     pub has_filter: bool,
+    /// The unit of products of slacks and multipliers.
+    pub objective_unit: f64,
     /// The largest residual, relative to units and multipliers.
     pub error: f64,
     /// That of the best iterate.
@@ -79,7 +83,8 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub best_iteration: Iteration,
     /// Infeasible, where bounds contradict each other.
     pub contradiction: Option<Status>,
-    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    /// Whether the run has converged in the units of the guess, and goes on with those of the
+    /// iterate.
     pub has_tightened: bool,
     /// Where variables are larger, it is asked whether the problem is unbounded.
     pub diverging_iterates: f64,
@@ -122,6 +127,7 @@ impl<'c> State<'c> {
             has_slacks: false,
             is_linearised,
             has_filter: false,
+            objective_unit: lengths.sizes.force,
             error: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
@@ -137,20 +143,30 @@ impl<'c> State<'c> {
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
-    /// The next barrier parameter, from residuals and with a unit of products in which errors are
-    /// relative; another one has another filter.
-    pub fn update_barrier<T: Real>(
+    /// The unit of products at an iterate: that of forces until the run would end.
+    pub fn measure_objective(&mut self, objective: f64) {
+        let (force, ends) = (self.lengths.sizes.force, self.has_tightened && !self.lengths.alone);
+        self.objective_unit = if ends { unit_of_products(objective, force) } else { force };
+    }
+
+    /// The next barrier parameter, from residuals; another one has another filter.
+    pub(in crate::ocp::nlp::ipm) fn update_barrier<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
-        (residuals, products): (&Residuals, f64),
+        Relative { barrier: (residuals, products), others, .. }: &Relative,
         options: &IpmOptions,
     ) {
         let force = self.lengths.sizes.force;
         let Inequalities { slack, multiplier, .. } = &iterate.sides;
-        let error =
-            |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
+        // What meets the tolerance, and may be rounding errors, holds no `μ` back.
+        let left = if *others <= options.tolerance { Residuals::default() } else { *residuals };
+        let error = |mu| {
+            let farthest = barrier::farthest(slack, multiplier, mu * force) / products;
+            barrier::error(&left, farthest)
+        };
         let mean = barrier::mean(&iterate.sides) / force;
-        let mu = force * self.progress.next(self.mu / force, error, mean, options.least_error(force));
+        let least = options.least_product(self.objective_unit) / force;
+        let mu = force * self.progress.next(self.mu / force, error, mean, least);
         if mu != self.mu {
             self.mu = mu;
             self.filter.clear();
@@ -160,8 +176,8 @@ impl<'c> State<'c> {
     /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
     /// that is all that is left, and stays, no smaller `μ` can make it less.
     pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
-        let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
-        let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
+        let tolerance = options.tolerance;
+        let is_last = self.mu <= 2.0 * barrier::least(options.least_product(self.objective_unit));
         let stays = error > tolerance.max(STALLED_DECREASE * self.error);
         self.complementarity_stall =
             if is_last && others <= tolerance && stays { self.complementarity_stall + 1 } else { 0 };

@@ -128,7 +128,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let wrong = part * state.force();
         let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
         let permitted = if begins || state.exact { 0.0 } else { part };
-        let rounding = if state.sizes.is_some() { ocp.rounding_of_gaps() } else { 0.0 };
+        let scaled = state.sizes.is_some();
+        let rounding = if scaled { ocp.rounding_of_gaps().max(ocp.rounding_of_forces()) } else { 0.0 };
         self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()).max(rounding));
         // After a step with penalties hard bounds, whose QP had no solution, are not tried again as
         // long as violations stay: a solution with penalties that violates nothing is one of

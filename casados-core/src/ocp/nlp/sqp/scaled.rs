@@ -9,7 +9,7 @@
 
 use super::Sqp;
 use super::state::State;
-use crate::ocp::assembly::units::{Sizes, Units, WIDE, of_tolerance};
+use crate::ocp::assembly::units::{Sizes, Units, WIDE, of_tolerance, unit_of_products};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic::{self, Worst};
@@ -149,12 +149,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let are_all_one = force == 1.0 && rows.iter().all(|&unit| unit == T::ONE);
         state.sizes = (!are_all_one).then_some(Sizes { force, least });
         if !are_all_one {
-            // The last digits of residuals count in units.
-            self.qp_solver.require(self.options.tolerance / WIDE);
+            // Residuals are judged in a hundredth of units, as a power of two.
+            self.qp_solver.require(self.options.tolerance / (2.0 * WIDE));
         }
     }
 
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate, and
+    /// with products of slacks and multipliers in units of the objective.
     pub(super) fn tightens<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -167,8 +168,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let scratch = self.trial.view_mut().v;
         // QPs are solved to a hundredth.
         let least = self.options.tolerance / WIDE;
-        let Some(smaller) = ocp.smaller_force(rows, sizes.force, least, scratch) else { return false };
-        sizes.force = power::<T>(smaller);
+        let smaller = ocp.smaller_force(rows, sizes.force, (least, false), scratch);
+        let products = unit_of_products(ocp.objective.to_f64(), sizes.force);
+        if smaller.is_none() && of_tolerance(products) >= of_tolerance(sizes.force) {
+            return false;
+        }
+        sizes.force = smaller.map_or(sizes.force, power::<T>);
         state.has_tightened = true;
         true
     }
@@ -210,6 +215,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let rounding = ocp.rounding_of_gaps();
         for residual in [&mut judged.dynamics, &mut judged.inequalities] {
             *residual = if *residual <= rounding { 0.0 } else { *residual };
+        }
+        if state.has_tightened {
+            let force = units.sizes.force;
+            let products = unit_of_products(ocp.objective.to_f64(), force);
+            judged.complementarity *= of_tolerance(force) / of_tolerance(products);
         }
         scale.way = Way::Back;
         scale.qp(&mut ocp.qp);

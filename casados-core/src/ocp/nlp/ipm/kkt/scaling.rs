@@ -49,12 +49,12 @@ pub(in crate::ocp::nlp::ipm) struct Relative {
 }
 
 /// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
-/// is that of all of them, `s_c` that of sides.
+/// is that of all of them, `s_c` that of sides. What is judged has its own unit of products.
 pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
     pi: &[T],
-    units: Units<'_, T>,
+    (units, objective): (Units<'_, T>, f64),
     of_stages: f64,
 ) -> Relative {
     let (force, units) = (units.sizes.force, units.rows);
@@ -68,9 +68,10 @@ pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
     let in_equations = of_sides(sides.equations, sides.free, units).fold(0.0, size);
     let (all, count) = of_gaps(dims, pi, units)
         .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
-    let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / S_MAX).max(1.0);
+    let mean = |sum: f64, count: usize, unit: f64| (sum / unit / count.max(1) as f64 / S_MAX).max(1.0);
     let pairs = sides.counts.pair_count();
-    let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
+    let s_d = mean(all, count + pairs + sides.counts.equations, force);
+    let [s_c, s_c_judged] = [force, objective].map(|unit| mean(in_sides, pairs, unit));
     let (mut in_units, mut judged, wide) = (T::ZERO, T::ZERO, T::from_f64(WIDE));
     for (&g, &unit) in iterate.stationarity.iter().zip(units) {
         in_units = nan_max(in_units, (g * unit).abs());
@@ -87,7 +88,7 @@ pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
     let judged = Residuals {
         stationarity: judged.to_f64() / (of_force * s_d),
         inequalities: inequalities(sides, units, of_tolerance),
-        complementarity: residuals.complementarity / (of_force * s_c),
+        complementarity: residuals.complementarity / (of_tolerance(objective) * s_c_judged),
         ..barrier
     };
     let others = Residuals { complementarity: 0.0, ..judged }.largest();

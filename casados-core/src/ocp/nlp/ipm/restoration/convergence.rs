@@ -2,6 +2,7 @@
 
 use super::elastic;
 use super::phase;
+use crate::ocp::assembly::units::{of_tolerance, unit_of_products};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
@@ -49,7 +50,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 impl State<'_> {
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate, and
+    /// with products of slacks and multipliers in units of the objective.
     fn tightens<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -60,9 +62,12 @@ impl State<'_> {
             return false;
         }
         let force = self.lengths.sizes.force;
-        let Some(smaller) = ocp.smaller_force(work.units, force, tolerance, work.scratch) else {
+        let smaller = ocp.smaller_force(work.units, force, (tolerance, true), work.scratch);
+        let products = unit_of_products(ocp.objective.to_f64(), force);
+        if smaller.is_none() && of_tolerance(products) >= of_tolerance(force) {
             return false;
-        };
+        }
+        let smaller = smaller.unwrap_or(force);
         self.has_tightened = true;
         (self.lengths.sizes.force, self.capacity.sizes.force) = (smaller, smaller);
         self.filter.clear();

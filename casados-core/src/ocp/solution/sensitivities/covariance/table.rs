@@ -40,7 +40,10 @@ impl<T: Real> Covariance<T> {
         let row = crate::qp::part(&self.rows, place * self.rank, self.rank);
         let is_known = !self.unknown.get(place).copied().unwrap_or(true);
         let variance = self.scale * crate::linalg::dot(row, row);
-        Cell { value: get(&self.values, place).to_f64(), deviation: is_known.then(|| variance.sqrt().to_f64()) }
+        Cell {
+            value: get(&self.values, place).to_f64(),
+            deviation: is_known.then(|| variance.sqrt().to_f64()),
+        }
     }
 }
 
