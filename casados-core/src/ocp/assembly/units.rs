@@ -108,17 +108,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 let stages = if is_one { span.clone() } else { path.clone() };
                 units_of_variable(qp, v, (stages, i), rows);
             }
-            for _ in 0..nx {
-                let reached = (0..nx).map(|i| units_of_reached_state(qp, (span.clone(), i), rows));
-                if !reached.fold(false, |any, one| any | one) {
-                    break;
-                }
-            }
-            for place in Places::<T>::new(qp.dims).filter(|place| span.contains(&place.stage)) {
-                for unit in part_mut(rows, place.row, place.nx).iter_mut().filter(|unit| **unit == T::ZERO) {
-                    *unit = T::ONE;
-                }
-            }
+            (0..nx).for_each(|i| units_of_driven_state(qp, (span.clone(), i), rows));
             let of_last = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..of_last).filter(|&j| !is_marked(qp.shared(), j)) {
                 units_of_variable(qp, v, (terminal.clone(), nx + j), rows);
@@ -233,32 +223,25 @@ fn units_of_variable<T: Real>(
     }
 }
 
-/// A state without bounds and guess is as large as what leads to it in an interval; whether it has
-/// a unit by now.
-fn units_of_reached_state<T: Real>(
-    qp: QpView<'_, T>,
-    (stages, i): (Stages<usize>, usize),
-    units: &mut [T],
-) -> bool {
-    let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.nx);
-    if places().any(|place| at(units, (place.row + i) as u32) > T::ZERO) {
-        return false;
+/// A state without bounds and guess is as large as what controls make of it in an interval, or
+/// larger: it adds up. What other states make of it says nothing: large terms of dynamics cancel.
+fn units_of_driven_state<T: Real>(qp: QpView<'_, T>, (stages, i): (Stages<usize>, usize), units: &mut [T]) {
+    let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
+    let unit = places().next().map_or(T::ONE, |place| at(units, (place.row + i) as u32));
+    if unit > T::ZERO {
+        return;
+    }
+    let mut driven = T::ZERO;
+    for (place, stage) in places().zip(qp.stages().skip(stages.start)).filter(|(place, _)| i < place.next) {
+        let column = part(stage.arrays().matrix, i * place.ld + place.nx, place.nu);
+        for (&b, &unit) in column.iter().zip(part(units, place.row + place.nx, place.nu)) {
+            driven = driven.max((b * unit).abs());
+        }
     }
     let mut range = Range::EMPTY;
-    for (place, stage) in
-        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage) && i < p.next)
-    {
-        let column = part(stage.arrays().matrix, i * place.ld, place.ld);
-        let terms = column.iter().zip(part(units, place.row, place.n));
-        range.add(terms.fold(T::ZERO, |most, (&a, &unit)| (a * unit).abs().max(most)));
-    }
-    if range.most == 0.0 {
-        return false;
-    }
-    range.least = range.most;
+    range.add(driven.max(T::ONE));
     let unit = range.unit_far_from_one();
-    places().for_each(|place| set(units, place.row + i, unit));
-    true
+    places().filter(|place| i < place.nx).for_each(|place| set(units, place.row + i, unit));
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.

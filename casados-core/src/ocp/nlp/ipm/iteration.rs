@@ -117,6 +117,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let worst = elastic::worst(ocp, state, (work.penalties, work.units));
         let size = nan_max(state.error, worst.map_or(0.0, |worst| worst.violation));
+        // Bounds are what they were given as, whatever their penalties are.
+        let hard = elastic::worst(ocp, state, (work.penalties, &[])).map_or(0.0, |worst| worst.violation);
+        row.residuals.inequalities = nan_max(row.residuals.inequalities, hard);
         let is_best = size < state.best_residual || state.best_residual.is_nan();
         if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);

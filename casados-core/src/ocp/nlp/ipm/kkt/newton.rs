@@ -198,7 +198,7 @@ pub(in crate::ocp::nlp::ipm) fn refine<T: Real>(
 }
 
 /// The largest residual of an equation after the full step, in units; zero if none is more than
-/// rounding.
+/// rounding, nor than the equation has already: a line search takes no step that adds to it.
 fn lack_of_equations<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let sides = &iterate.sides;
     let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
@@ -206,7 +206,9 @@ fn lack_of_equations<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let lacks = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
         let lacks = (residual + at(iterate.step, row)).abs().to_f64();
-        if lacks <= rounding * (unit + at(iterate.v, row).abs().to_f64()) { 0.0 } else { lacks / unit }
+        let size = unit + at(iterate.v, row).abs().to_f64();
+        let most = (rounding * size).min(residual.abs().to_f64()).max(10.0 * T::EPSILON * size);
+        if lacks <= most { 0.0 } else { lacks / unit }
     });
     lacks.fold(0.0, f64::max)
 }
