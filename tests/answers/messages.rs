@@ -172,3 +172,25 @@ fn of_a_constraint_whose_gradient_vanishes_off_the_mechanism() {
     let numbers: Vec<u32> = rank.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     assert!(matches!(numbers[..], [full, points] if 0 < full && full < points), "{rank}");
 }
+
+/// Of a model without parameters none is listed, and one reference *is* at stages.
+#[test]
+fn of_what_there_is_none() -> Test {
+    let problem = Problem::new(casados::ocp::Map::<Push, f64>::new())
+        .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]));
+    let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;
+    let text = ocp.free("mass", 0.0..=1.0, 0.5).err().map(|error| error.to_string());
+    assert_eq!(text.as_deref(), Some("`Push` has no parameter `mass`: it has none"));
+    let text = ocp.set_reference(3.., &[0.0; 2]).err().map(|error| error.to_string());
+    let expected = "there is no stage 3: the reference of the stage cost is at stages 0 to 2";
+    assert_eq!(text.as_deref(), Some(expected));
+    Ok(())
+}
+#[function]
+fn push(x: f64, u: f64) -> f64 {
+    x + u
+}
+#[function]
+fn both(x: f64, u: f64) -> [f64; 2] {
+    [x, u]
+}

@@ -39,6 +39,9 @@ const ATTEMPTS: [Attempt; 5] = [
     Attempt::Damped(MOST_DAMPING),
 ];
 const MOST_DAMPING: f64 = 1e2;
+/// IPOPT's `acceptable_tol` over its `tol`: what is left at a point that is acceptable, in
+/// tolerances.
+const ACCEPTABLE: f64 = 100.0;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -136,7 +139,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.leave_elastic(ocp, &mut state);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && state.has_tightened {
+        if stuck && state.has_tightened && state.best_residual <= ACCEPTABLE * self.options.tolerance {
             outcome.status = Status::Acceptable;
         }
         // What is infeasible is said of the last iterate.
