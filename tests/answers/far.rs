@@ -150,8 +150,8 @@ fn runs(known: &Known) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
 }
 
 /// The conditions of optimality hold to 1e-8 in units, each off by a hundred at most, and the
-/// reduced Hessian is at least a half of these: solutions are as near as 1e-5, also where the origin
-/// of a control is 1e8 times the room between its bounds.
+/// reduced Hessian is at least a half of these: solutions are as near as 1e-5, also where the
+/// origin of a control is 1e8 away and the room between its bounds is two.
 #[test]
 fn solutions_far_from_one() -> Test {
     let mut random = Random::new(11);

@@ -48,10 +48,10 @@ pub(in crate::ocp) fn of_tolerance(unit: f64) -> f64 {
     unit.min(1.0).max(unit / WIDE)
 }
 
-/// The unit of products of slacks and multipliers at the end of a run, in an objective of this size:
-/// their sum is what that is from its minimum. It is no more than the unit of forces, in which the
-/// unit of a variable is a factor, however far away its origin is, and no less than one where that
-/// is larger.
+/// The unit of products of slacks and multipliers at the end of a run, in an objective of this
+/// size: their sum is what that is from its minimum. It is no more than the unit of forces, in
+/// which the unit of a variable is a factor, however far away its origin is, and no less than one
+/// where that is larger.
 pub(in crate::ocp) fn unit_of_products(objective: f64, force: f64) -> f64 {
     if objective.is_finite() { objective.abs().clamp(force.min(1.0), force) } else { force }
 }
@@ -217,13 +217,14 @@ fn units_of_variable<T: Real>(
         range.add(guess);
     }
     let is_state = places().next().is_some_and(|place| i < place.nx);
-    let unit = if is_state && range.most == 0.0 { T::ZERO } else { range.unit_far_from_one() };
+    let is_unknown = is_state && range.most == 0.0 && guess == T::ZERO;
+    let unit = if is_unknown { T::ZERO } else { range.unit_far_from_one() };
     for place in places() {
         set(units, place.row + i, unit);
     }
 }
 
-/// A state without bounds and guess is as large as what controls make of it in an interval, or
+/// A state without bounds, whose guess is zero, is as large as what controls make of it in an interval, or
 /// larger: it adds up. What other states make of it says nothing: large terms of dynamics cancel.
 fn units_of_driven_state<T: Real>(qp: QpView<'_, T>, (stages, i): (Stages<usize>, usize), units: &mut [T]) {
     let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));

@@ -154,8 +154,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate, and
-    /// with products of slacks and multipliers in units of the objective.
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate,
+    /// and with products of slacks and multipliers in units of the objective.
     pub(super) fn tightens<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,

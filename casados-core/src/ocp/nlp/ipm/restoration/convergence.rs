@@ -50,8 +50,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 impl State<'_> {
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate, and
-    /// with products of slacks and multipliers in units of the objective.
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate,
+    /// and with products of slacks and multipliers in units of the objective.
     fn tightens<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
