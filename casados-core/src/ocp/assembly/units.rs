@@ -108,7 +108,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 let stages = if is_one { span.clone() } else { path.clone() };
                 units_of_variable(qp, v, (stages, i), rows);
             }
-            (0..nx).for_each(|i| units_of_driven_state(qp, (span.clone(), i), rows));
+            (0..nx).for_each(|i| unit_of_driven_state(qp, (span.clone(), i), rows));
             let of_last = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..of_last).filter(|&j| !is_marked(qp.shared(), j)) {
                 units_of_variable(qp, v, (terminal.clone(), nx + j), rows);
@@ -226,7 +226,8 @@ fn units_of_variable<T: Real>(
 
 /// A state without bounds, whose guess is zero, is as large as what controls make of it in an interval, or
 /// larger: it adds up. What other states make of it says nothing: large terms of dynamics cancel.
-fn units_of_driven_state<T: Real>(qp: QpView<'_, T>, (stages, i): (Stages<usize>, usize), units: &mut [T]) {
+fn unit_of_driven_state<T: Real>(qp: QpView<'_, T>, of: (Stages<usize>, usize), units: &mut [T]) {
+    let (stages, i) = of;
     let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
     let unit = places().next().map_or(T::ONE, |place| at(units, (place.row + i) as u32));
     if unit > T::ZERO {
