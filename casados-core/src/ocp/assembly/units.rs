@@ -224,8 +224,9 @@ fn units_of_variable<T: Real>(
     }
 }
 
-/// A state without bounds, whose guess is zero, is as large as what controls make of it in an interval, or
-/// larger: it adds up. What other states make of it says nothing: large terms of dynamics cancel.
+/// A state without bounds, whose guess is zero, is as large as what controls make of it in an
+/// interval, or larger: it adds up. What other states make of it says nothing: large terms of
+/// dynamics cancel.
 fn unit_of_driven_state<T: Real>(qp: QpView<'_, T>, of: (Stages<usize>, usize), units: &mut [T]) {
     let (stages, i) = of;
     let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
