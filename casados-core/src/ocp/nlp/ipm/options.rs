@@ -26,6 +26,7 @@ pub struct IpmOptions {
     /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below: the stationarity
     /// over `s_d` and the complementarity over `s_c`, which are `max(1, mean |multiplier| / 100)`
     /// of all multipliers and of those of bounds in their units ([`scaling`](Self::scaling)).
+    /// Complementarity is judged in units of the objective where a run would end.
     /// Where units are above 100 the tolerance is this times a hundredth of them, where they are
     /// below one it is this times the unit. Default 1e-8; of single precision 1e-3.
     pub tolerance: f64,
