@@ -48,6 +48,18 @@ pub(in crate::ocp) fn tolerance_factor(unit: f64) -> f64 {
     unit.min(1.0).max(unit / NEAR_ONE_RATIO)
 }
 
+/// The unit of products of slacks and multipliers at the end of a run, in an objective of this
+/// size: their sum is what that is from its minimum. It is no more than the unit of forces, in
+/// which the unit of a variable is a factor, however far away its origin is, and no less than one
+/// where that is larger.
+pub(in crate::ocp) fn product_unit(objective: f64, objective_unit: f64) -> f64 {
+    if objective.is_finite() {
+        objective.abs().clamp(objective_unit.min(1.0), objective_unit)
+    } else {
+        objective_unit
+    }
+}
+
 /// The least and the largest of the sizes that something may have.
 #[derive(Clone, Copy)]
 struct MagnitudeRange {
@@ -93,12 +105,14 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let last = span.end.saturating_sub(1);
             let (path, terminal) = (span.start..last, last..span.end);
             let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
+            // Zero where nothing is known of a state.
             for i in 0..nx + nu {
                 // Controls of the last stage are those that all stages share, or others.
                 let is_single_variable = i < nx || is_marked(qp.shared(), i - nx);
                 let stages = if is_single_variable { span.clone() } else { path.clone() };
                 set_variable_unit(qp, v, (stages, i), rows);
             }
+            (0..nx).for_each(|i| set_driven_state_unit(qp, (span.clone(), i), rows));
             let last_controls = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..last_controls).filter(|&j| !is_marked(qp.shared(), j)) {
                 set_variable_unit(qp, v, (terminal.clone(), nx + j), rows);
@@ -116,19 +130,21 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
     /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
-    /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
-    /// residual in units of forces that is asked for.
+    /// `r` is large at the guess, and one at a solution nearby. With units of rows, the least
+    /// residual in units of forces that is asked for, and whether what forces change by counts,
+    /// too, whose rounding errors gradients have.
     pub(in crate::ocp) fn reduced_objective_unit(
         &self,
         rows: &[T],
         objective_unit: f64,
-        min_row_unit: f64,
+        (min_row_unit, counts_changes): (f64, bool),
         scratch: &mut [T],
     ) -> Option<f64> {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        let [slope, _] = largest_gradient_and_change(qp, v, rows, scratch);
-        let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
-        let smaller_unit = size.max(ROUNDING_ERROR_MARGIN * T::EPSILON / min_row_unit * objective_unit);
+        let [slope, change] = largest_gradient_and_change(qp, v, rows, scratch).map(T::to_f64);
+        let size = slope.max(self.objective.abs().to_f64()).max(1.0);
+        let terms = if counts_changes { objective_unit.max(change) } else { objective_unit };
+        let smaller_unit = size.max(ROUNDING_ERROR_MARGIN * T::EPSILON / min_row_unit * terms);
         (smaller_unit * NEAR_ONE_RATIO < objective_unit).then_some(smaller_unit)
     }
 
@@ -163,6 +179,19 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         SUM_ROUNDING_FACTOR * T::EPSILON * largest.to_f64()
     }
+
+    /// What rounding leaves of stationarity: the last digits of the largest product of a curvature
+    /// and a variable of the iterate.
+    pub(in crate::ocp) fn gradient_rounding_error(&self) -> f64 {
+        let ((v, _), mut largest) = (self.iterate.variables_and_costates(), T::ZERO);
+        for (place, stage) in Places::<T>::new(self.qp.dims()).zip(self.qp().stages()) {
+            let curvatures = stage.arrays().hessian.iter().step_by(place.ld + 1);
+            for (&curvature, &v) in curvatures.zip(part(v, place.v, place.n)) {
+                largest = largest.max((curvature * v).abs());
+            }
+        }
+        SUM_ROUNDING_FACTOR * T::EPSILON * largest.to_f64()
+    }
 }
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
@@ -192,10 +221,37 @@ fn set_variable_unit<T: Real>(
     if range.largest > 0.0 || guess > T::ONE {
         range.add(guess);
     }
-    let unit = range.unit_unless_near_one();
+    let is_state = variable_places().next().is_some_and(|place| i < place.nx);
+    let is_unknown = is_state && range.largest == 0.0 && guess == T::ZERO;
+    let unit = if is_unknown { T::ZERO } else { range.unit_unless_near_one() };
     for place in variable_places() {
         set(units, place.row + i, unit);
     }
+}
+
+/// A state without bounds, whose guess is zero, is as large as what controls make of it in an
+/// interval, or larger: it adds up. What other states make of it says nothing: large terms of
+/// dynamics cancel.
+fn set_driven_state_unit<T: Real>(qp: QpView<'_, T>, of: (Stages<usize>, usize), units: &mut [T]) {
+    let (stages, i) = of;
+    let variable_places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
+    let unit = variable_places().next().map_or(T::ONE, |place| at(units, (place.row + i) as u32));
+    if unit > T::ZERO {
+        return;
+    }
+    let mut driven = T::ZERO;
+    for (place, stage) in
+        variable_places().zip(qp.stages().skip(stages.start)).filter(|(place, _)| i < place.next)
+    {
+        let column = part(stage.arrays().matrix, i * place.ld + place.nx, place.nu);
+        for (&b, &unit) in column.iter().zip(part(units, place.row + place.nx, place.nu)) {
+            driven = driven.max((b * unit).abs());
+        }
+    }
+    let mut range = MagnitudeRange::EMPTY;
+    range.add(driven.max(T::ONE));
+    let unit = range.unit_unless_near_one();
+    variable_places().filter(|place| i < place.nx).for_each(|place| set(units, place.row + i, unit));
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.

@@ -22,9 +22,8 @@ pub struct ResidualTolerances<T> {
 }
 
 impl<T: Real> ResidualTolerances<T> {
-    /// At least a tolerance that is asked for.
-    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: PenaltyMode, scaled: bool) -> Self {
-        let values = T::from_f64(options.tolerance).max(relaxed);
+    /// Those of a tolerance.
+    pub fn new(options: &InteriorPointOptions, values: T, penalties: PenaltyMode, scaled: bool) -> Self {
         // What multipliers are to prove depends on how well gradients vanish.
         let share = if penalties == PenaltyMode::Hard { 0.01 } else { 1.0 };
         // Units are estimates.

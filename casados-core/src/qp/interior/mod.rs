@@ -98,8 +98,10 @@ use units::Units;
 pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
     pub options: InteriorPointOptions,
-    /// A tolerance above that of the options is asked for.
+    /// A tolerance above that of the options is enough.
     relaxed: T,
+    /// A tolerance below that of the options is asked for.
+    required: T,
     /// The iterations of a call, where the caller has ways out of its own.
     limit: Option<usize>,
     numbers: N,
@@ -184,6 +186,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         Self {
             options: InteriorPointOptions::new::<T>(),
             relaxed: T::ZERO,
+            required: T::from_f64(f64::INFINITY),
             limit: None,
             numbers,
             indices,
@@ -233,7 +236,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if reading.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
-        let limits = ResidualTolerances::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
+        let asked = T::from_f64(self.options.tolerance).min(self.required).max(self.relaxed);
+        let limits = ResidualTolerances::new(&self.options, asked, attempt.penalties, found.is_some());
         T::run_precompiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -349,5 +353,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
 
     fn permit(&mut self, tolerance: f64) {
         self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
+    }
+
+    fn require(&mut self, tolerance: f64) {
+        self.required = T::from_f64(if tolerance > 0.0 { tolerance } else { f64::INFINITY });
     }
 }

@@ -71,7 +71,7 @@ pub trait Curvature<D, T: Real>: Copy {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GaussNewton {
-    /// What is done where a general cost is not convex.
+    /// What is done where a general cost is not convex. Default [`Convexification::Project`].
     pub convexification: Convexification,
 }
 

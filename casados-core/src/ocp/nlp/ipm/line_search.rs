@@ -28,6 +28,8 @@ pub(super) struct FilterModel {
     pub current: FilterPair,
     /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
+    /// What rounding leaves of a difference of barrier functions.
+    pub noise: f64,
     /// `θ_min`: below this violation the barrier function may decide.
     pub theta_min: f64,
     /// No step leaves more violation.
@@ -62,18 +64,17 @@ impl FilterModel {
 
     /// Whether neither the violation nor the barrier function changes by more than rounding errors:
     /// the step changes multipliers.
-    fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
+    fn changes_only_rounding(&self, trial_pair: &FilterPair) -> bool {
         self.current.violation <= self.rounding_violation
             && trial_pair.violation <= self.rounding_violation
-            && (trial_pair.objective - self.current.objective).abs() <= noise
+            && (trial_pair.objective - self.current.objective).abs() <= self.noise
     }
 
     /// Whether a point after a step of this length is good enough; the filter grows where the
     /// barrier function does not decide.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, trial_pair: &FilterPair) -> bool {
-        // What rounding leaves of a difference of barrier functions.
-        let noise = 10.0 * f64::EPSILON * self.current.objective.abs();
-        if self.changes_only_rounding(trial_pair, noise) {
+        let noise = self.noise;
+        if self.changes_only_rounding(trial_pair) {
             return true;
         }
         if !trial_pair.is_finite()

@@ -3,7 +3,10 @@
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
+
+/// IPOPT's `slack_move`, as a power of the accuracy of numbers.
+const SLACK_MOVE: f64 = 0.75;
 
 /// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
@@ -23,6 +26,7 @@ pub struct IpmOptions {
     /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below: the stationarity
     /// over `s_d` and the complementarity over `s_c`, which are `max(1, mean |multiplier| / 100)`
     /// of all multipliers and of those of bounds in their units ([`scaling`](Self::scaling)).
+    /// Complementarity is judged in units of the objective where a run would end.
     /// Where units are above 100 the tolerance is this times a hundredth of them, where they are
     /// below one it is this times the unit. Default 1e-8; of single precision 1e-3.
     pub tolerance: f64,
@@ -44,7 +48,8 @@ pub struct IpmOptions {
     /// What it follows. Default [`Barrier::Adaptive`].
     pub barrier: Barrier,
     /// Bounds are left by this at the start, relative to their size and to the room between them;
-    /// at most 0.5. Default 1e-2.
+    /// at most 0.5. A push below IPOPT's `slack_move`, `ε^(3/4)` (1.8e-12; 6.4e-6 in single
+    /// precision), is that. Default 1e-2.
     pub bound_push: f64,
     /// Whether constants of the algorithm are multiples of units, found where a run begins. That of
     /// forces is
@@ -103,9 +108,17 @@ impl IpmOptions {
         }
     }
 
-    /// The tolerance, or what the last barrier parameter leaves, in units of forces.
-    pub(super) fn barrier_tolerance(&self, objective_unit: f64) -> f64 {
-        (self.tolerance * tolerance_factor(objective_unit)).max(10.0 * self.final_mu) / objective_unit
+    /// What products of slacks and multipliers have to be below, by the unit of the objective, or
+    /// what the last barrier parameter leaves of them.
+    pub(super) fn product_tolerance(&self, product_unit: f64) -> f64 {
+        (self.tolerance * tolerance_factor(product_unit)).max(10.0 * self.final_mu)
+    }
+
+    /// How far bounds are left at the start. A slack of less than `slack_move`, `ε^(3/4)`, is
+    /// smaller than what rounding leaves of a step along its bound, and lets no step go far enough.
+    pub(super) fn push<T: Real>(&self, warm: bool) -> T {
+        let push = if warm { self.warm_push } else { self.bound_push };
+        T::from_f64(push.max(Scalar::powf(T::EPSILON, SLACK_MOVE)))
     }
 
     /// The first barrier parameter.

@@ -4,7 +4,9 @@ use super::IpmOptions;
 use super::barrier::{self, AdaptiveMu, Barrier};
 use super::kkt::dimensions::KktDimensions;
 use super::kkt::regularisation::Regularisation;
+use super::kkt::scaling::ScaledResiduals;
 use super::violations::RestorationPhase;
+use crate::ocp::assembly::units;
 use crate::ocp::nlp::filter::Filter;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
@@ -71,6 +73,8 @@ pub(in crate::ocp::nlp) struct RunState<'c> {
     pub is_linearised: bool,
     /// Whether the filter has the bound of violations that belongs to these slacks.
     pub filter_is_initialised: bool,
+    /// The unit of products of slacks and multipliers.
+    pub product_unit: f64,
     /// The largest residual, relative to units and multipliers.
     pub nlp_error: f64,
     /// That of the best iterate.
@@ -79,7 +83,8 @@ pub(in crate::ocp::nlp) struct RunState<'c> {
     pub best_iteration: Iteration,
     /// Infeasible, where bounds contradict each other.
     pub contradictory_bounds: Option<Status>,
-    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    /// Whether the run has converged in the units of the guess, and goes on with those of the
+    /// iterate.
     pub has_rescaled_objective: bool,
     /// Where variables are larger, it is asked whether the problem is unbounded.
     pub diverging_iterates_tol: f64,
@@ -122,6 +127,7 @@ impl<'c> RunState<'c> {
             slacks_are_current: false,
             is_linearised,
             filter_is_initialised: false,
+            product_unit: lengths.scaling.objective_unit,
             nlp_error: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
@@ -137,30 +143,42 @@ impl<'c> RunState<'c> {
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
-    /// The next barrier parameter, from residuals and with a unit of products in which errors are
-    /// relative; another one has another filter.
-    pub fn update_mu<T: Real>(
+    /// The unit of products at an iterate: that of forces until the run would end.
+    pub fn update_product_unit(&mut self, objective: f64) {
+        let objective_unit = self.dimensions.scaling.objective_unit;
+        let is_final = self.has_rescaled_objective && !self.dimensions.in_restoration;
+        self.product_unit =
+            if is_final { units::product_unit(objective, objective_unit) } else { objective_unit };
+    }
+
+    /// The next barrier parameter, from residuals; another one has another filter.
+    pub(in crate::ocp::nlp::ipm) fn update_mu<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
-        (residuals, products): (&Residuals, f64),
+        ScaledResiduals {
+            barrier_residuals: (residuals, products),
+            error_without_complementarity,
+            ..
+        }: &ScaledResiduals,
         options: &IpmOptions,
     ) {
         let objective_unit = self.dimensions.scaling.objective_unit;
         let Inequalities { slack, multiplier, .. } = &iterate.sides;
+        // What meets the tolerance, and may be rounding errors, holds no `μ` back.
+        let left = if *error_without_complementarity <= options.tolerance {
+            Residuals::default()
+        } else {
+            *residuals
+        };
         let error = |mu| {
-            barrier::barrier_error(
-                residuals,
-                barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products,
-            )
+            let complementarity =
+                barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products;
+            barrier::barrier_error(&left, complementarity)
         };
         let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let tolerance = options.product_tolerance(self.product_unit) / objective_unit;
         let mu = objective_unit
-            * self.adaptive_mu.update_mu(
-                self.mu / objective_unit,
-                error,
-                mean_complementarity,
-                options.barrier_tolerance(objective_unit),
-            );
+            * self.adaptive_mu.update_mu(self.mu / objective_unit, error, mean_complementarity, tolerance);
         if mu != self.mu {
             self.mu = mu;
             self.filter.clear();
@@ -170,9 +188,8 @@ impl<'c> RunState<'c> {
     /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
     /// that is all that is left, and stays, no smaller `μ` can make it less.
     pub fn update_nlp_error(&mut self, error: f64, error_without_complementarity: f64, options: &IpmOptions) {
-        let (objective_unit, tolerance) = (self.dimensions.scaling.objective_unit, options.tolerance);
-        let is_min_mu =
-            self.mu <= 2.0 * objective_unit * barrier::min_mu(options.barrier_tolerance(objective_unit));
+        let tolerance = options.tolerance;
+        let is_min_mu = self.mu <= 2.0 * barrier::min_mu(options.product_tolerance(self.product_unit));
         let is_stalled = error > tolerance.max(STALLED_COMPLEMENTARITY_RATIO * self.nlp_error);
         self.complementarity_stall_iterations =
             if is_min_mu && error_without_complementarity <= tolerance && is_stalled {

@@ -209,7 +209,7 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
 }
 
 /// The largest residual of an equation after the full step, in units; zero if none is more than
-/// rounding.
+/// rounding, nor than the equation has already: a line search takes no step that adds to it.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let inequalities = &iterate.sides;
     let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
@@ -217,11 +217,9 @@ fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> 
     let lacks = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
         let residual_after_step = (residual + at(iterate.step, row)).abs().to_f64();
-        if residual_after_step <= rounding * (unit + at(iterate.v, row).abs().to_f64()) {
-            0.0
-        } else {
-            residual_after_step / unit
-        }
+        let size = unit + at(iterate.v, row).abs().to_f64();
+        let most = (rounding * size).min(residual.abs().to_f64()).max(10.0 * T::EPSILON * size);
+        if residual_after_step <= most { 0.0 } else { residual_after_step / unit }
     });
     lacks.fold(0.0, f64::max)
 }

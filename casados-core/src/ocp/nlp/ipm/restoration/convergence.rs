@@ -2,6 +2,7 @@
 
 use super::elastic_mode;
 use super::phase;
+use crate::ocp::assembly::units::{product_unit, tolerance_factor};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
@@ -56,7 +57,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 impl RunState<'_> {
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate,
+    /// and with products of slacks and multipliers in units of the objective.
     fn rescale_objective<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -67,9 +69,12 @@ impl RunState<'_> {
             return false;
         }
         let force = self.dimensions.scaling.objective_unit;
-        let Some(smaller) = ocp.reduced_objective_unit(work.units, force, tolerance, work.scratch) else {
+        let smaller = ocp.reduced_objective_unit(work.units, force, (tolerance, true), work.scratch);
+        let products = product_unit(ocp.objective.to_f64(), force);
+        if smaller.is_none() && tolerance_factor(products) >= tolerance_factor(force) {
             return false;
-        };
+        }
+        let smaller = smaller.unwrap_or(force);
         self.has_rescaled_objective = true;
         (self.dimensions.scaling.objective_unit, self.max_dimensions.scaling.objective_unit) =
             (smaller, smaller);
