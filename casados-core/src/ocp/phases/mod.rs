@@ -1,18 +1,19 @@
-//! Problems of several phases, solved as one.
+//! Problems with several phases, solved as one.
 //!
 //! ```text
 //! start   →   phase 0: x₀ … x_N   →   phase 1: x₀ = link(x_N, p of phase 0) … x_N   →   …
 //! ```
 //!
-//! What is decided where a phase begins, its parameters and what no link says, are controls of the
-//! stage before it: the last one of the phase before, or a stage without states, the start.
+//! Decisions at the start of a phase, its free parameters and the states that no link determines,
+//! are controls of the stage before: the last stage of the previous phase, or the start, a stage
+//! without states.
 //!
 //! | | |
 //! | --- | --- |
-//! | `link` | what connects two phases |
-//! | `phase` | a phase, whatever its problem is |
-//! | `transfer` | points, bounds and QPs go from a phase to the whole and back |
-//! | `program` | what solvers ask |
+//! | `link` | the map from the end of a phase to the start of the next |
+//! | `phase` | a phase, independent of the type of its problem |
+//! | `stage_conversion` | points, bounds and QPs of phases and of the joined problem |
+//! | `program` | the interface to solvers |
 
 mod link;
 mod phase;
@@ -42,27 +43,28 @@ use core::fmt;
 use phase::{Phase, PhaseSize};
 use stage_conversion::StagePosition;
 
-/// Problems that follow one another, solved as one: other models, other horizons, other controls.
+/// A sequence of problems, solved as one, each with its own model, horizon and controls.
 ///
 /// ```text
 /// min  Σ_i (costs of phase i)        x₀ of phase i+1 = link_i(x_N, p of phase i)
 /// ```
 ///
 /// A phase is a problem on a horizon, with bounds, costs, constraints, free parameters and guesses
-/// by its own names. How long it takes is fixed, or found ([`Horizon::free`](crate::ocp::Horizon));
-/// each has its own clock, which begins at its first node. The first one has an initial state, that
-/// of another is what its [`Link`] makes of the end of the one before: [`Continuous`], or a
-/// [`Jump`].
+/// by its own names. Its duration is fixed or free ([`Horizon::free`](crate::ocp::Horizon)); its
+/// time starts at its first node. The first phase has an initial state; the [`Link`] before another
+/// phase maps the end of the previous one to its first state: [`Continuous`], or a [`Jump`].
 ///
-/// `join` makes one problem of them, which [`Sqp`](crate::ocp::Sqp) and [`Ipm`](crate::ocp::Ipm)
-/// solve with exact derivatives, in time that is linear in the number of intervals. It borrows the
-/// phases; after a solver each has its part of the iterate, with multipliers.
+/// `join` makes one problem of the phases, which [`Sqp`](crate::ocp::Sqp) and
+/// [`Ipm`](crate::ocp::Ipm) solve with exact derivatives, in time that is linear in the number of
+/// intervals. It borrows the phases; after a run each phase has its part of the iterate, with
+/// multipliers.
 ///
-/// Parameters of a phase are states of the whole, with `w₊ = w`; each phase carries its own alone.
+/// Free parameters of a phase are states of the joined problem, with `w₊ = w`; each phase has only
+/// its own.
 ///
 /// # Example
-/// A ball is thrown up, hits the ground where half of its speed is left, and is to be as high as it
-/// was after as short a time as possible. The speed at the start is bounded.
+/// A ball is thrown up, bounces with half of its speed, and must return to its first height in
+/// minimum time. Its initial speed is bounded.
 /// ```
 /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Jump, Phases, Problem};
 /// use casados::prelude::*;
@@ -97,24 +99,24 @@ use stage_conversion::StagePosition;
 /// ```
 pub struct Phases<'a, T = f64> {
     phases: Vec<JoinedPhase<'a, T>>,
-    /// A point that is tried, as one of each phase; none before they are joined.
+    /// The trial point of each phase; empty before `join`.
     trial_points: Vec<TrialPoint<T>>,
-    /// The first state of all, as far as it is given.
+    /// The fixed elements of the first state.
     initial_state: Vec<T>,
 }
 
-/// A point of a phase, and the ends of its intervals and constraints there.
+/// A trial point of a phase, with the ends of its intervals and its constraints there.
 struct TrialPoint<T> {
     point: HeapSolution<T>,
     ends: Vec<T>,
 }
 
-/// A phase, and what follows it.
+/// A phase and the link after it.
 struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
     link: Option<Box<dyn Link<T> + 'a>>,
     size: PhaseSize,
-    /// The first of its stages among all.
+    /// The index of its first stage in the joined problem.
     first: usize,
 }
 
@@ -125,7 +127,7 @@ impl<T> fmt::Debug for Phases<'_, T> {
 }
 
 impl<'a, T: Real> Phases<'a, T> {
-    /// Of the first phase.
+    /// Starts a sequence with its first phase.
     pub fn new<P>(first: &'a mut HeapOcp<P, T>) -> Self
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
@@ -133,7 +135,7 @@ impl<'a, T: Real> Phases<'a, T> {
         Self { phases: vec![JoinedPhase::new(first)], trial_points: Vec::new(), initial_state: Vec::new() }
     }
 
-    /// With another phase, which begins where the link says.
+    /// Appends a phase, which starts by the link.
     #[must_use]
     pub fn then<P>(mut self, link: impl Link<T> + 'a, next: &'a mut HeapOcp<P, T>) -> Self
     where
@@ -146,16 +148,16 @@ impl<'a, T: Real> Phases<'a, T> {
         self
     }
 
-    /// One problem of all phases, whose iterate is the guess of each. Its stages are the start and
-    /// those of the phases, one after the other.
+    /// Joins the phases to one problem, whose iterate consists of their guesses. Its stages are the
+    /// start and the stages of all phases in order.
     ///
-    /// What is set in a phase afterwards takes another `join`.
+    /// Later changes of a phase require another `join`.
     ///
     /// # Errors
     /// [`OcpError::LinkDimension`], [`OcpError::NotThere`], [`OcpError::DependsOnTime`] of a link;
-    /// [`OcpError::Phase`] of an initial state behind the first phase, of collocation, periodic
-    /// states and shared controls; [`OcpError::Missing`] and others of a phase that is not complete
-    /// ([`Ocp::check`]); [`OcpError::OutOfMemory`].
+    /// [`OcpError::Phase`] for a fixed initial state after the first phase, for collocation,
+    /// periodic states and shared controls; [`OcpError::Missing`] and other errors of an incomplete
+    /// phase ([`Ocp::check`]); [`OcpError::OutOfMemory`].
     pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
@@ -199,7 +201,7 @@ impl<'a, T: Real> Phases<'a, T> {
     }
 
     /// # Errors
-    /// Those of [`Phases::join`].
+    /// The errors of [`Phases::join`].
     fn check(&mut self) -> Result<(), OcpError> {
         for (index, phase) in self.phases.iter_mut().enumerate() {
             if let Some(what) = phase.problem.unsupported_feature(index == 0) {
@@ -219,7 +221,7 @@ impl<'a, T: Real> Phases<'a, T> {
         Ok(())
     }
 
-    /// The first state of all, as far as it is given.
+    /// Returns the fixed elements of the first state.
     fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
         let Some(JoinedPhase { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
         let mut start = zeros(size.given_states)?;
@@ -229,18 +231,18 @@ impl<'a, T: Real> Phases<'a, T> {
         Ok(start)
     }
 
-    /// How large the phase behind each one is.
+    /// Returns the size of the next phase, for each phase.
     fn next_sizes(&self) -> Vec<Option<PhaseSize>> {
         self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
     }
 
-    /// The phase of a stage of the whole; none of the start.
+    /// Returns the phase of a stage of the joined problem; none for the start.
     fn at(&self, stage: usize) -> Option<(usize, &JoinedPhase<'a, T>)> {
         self.phases.iter().enumerate().rev().find(|(_, phase)| phase.first <= stage)
     }
 
-    /// Bounds of all stages, and those of constraints as they were given: the lower ones, then the
-    /// upper ones.
+    /// Writes the bounds of all stages, and the bounds of constraints as the user gave them: lower
+    /// bounds, then upper bounds.
     fn write_bounds(&mut self, qp: &mut Qp<T, Vec<StageDims>, Vec<T>>, given: &mut [T]) {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
@@ -269,7 +271,7 @@ impl<'a, T: Real> Phases<'a, T> {
         }
     }
 
-    /// The iterates of all phases as that of the whole.
+    /// Writes the iterates of all phases to the iterate of the joined problem.
     fn store_iterates(&self, to: &mut HeapSolution<T>) {
         let first_stages =
             || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
@@ -290,7 +292,7 @@ impl<'a, T: Real> Phases<'a, T> {
         });
     }
 
-    /// The part of each phase in a point of the whole, as its iterate.
+    /// Reads a point of the joined problem to the iterates of the phases.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
         for JoinedPhase { problem, size, .. } in &mut self.phases {
@@ -309,7 +311,8 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
     }
 }
 
-/// Room for two matrices and a vector over the variables of a stage, or for four vectors.
+/// Returns the length of two matrices and a vector over the variables of a stage, or of four
+/// vectors.
 fn scratch_len<T>(dims: &[StageDims]) -> usize {
     let of_stage = |stage: &StageDims| {
         let n = stage.nx + stage.nu;

@@ -1,4 +1,4 @@
-//! A phase, whatever its problem is.
+//! The interface of a phase, independent of the type of its problem.
 
 use super::link::{PhaseDims, PhaseEnd};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
@@ -16,14 +16,14 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use core::ops::Range;
 
-/// The Hessian that a solver takes.
+/// The kind of Hessian.
 #[derive(Clone, Copy)]
 pub(super) struct Kind {
     pub exact: bool,
     pub convexification: Convexification,
 }
 
-/// How large a phase is.
+/// The dimensions of a phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PhaseSize {
     /// States.
@@ -34,49 +34,51 @@ pub(super) struct PhaseSize {
     pub model_states: usize,
     /// Linear controls.
     pub linear_controls: usize,
-    /// States whose start the link says; those up to `own + linear` behind them are decided.
+    /// States that the link gives; the states from here to `model_states + linear_controls` are
+    /// decided.
     pub given_states: usize,
     pub intervals: usize,
 }
 
 impl PhaseSize {
-    /// The states that are decided where the phase begins.
+    /// Returns the states that are decided at the start of the phase.
     pub fn free_start_states(&self) -> Range<usize> {
         self.given_states..self.model_states + self.linear_controls
     }
 
-    /// How much is decided there: these states, then the parameters.
+    /// Returns the number of variables that are decided there: states, then free parameters.
     pub fn start_variable_count(&self) -> usize {
         self.free_start_states().len() + self.free
     }
 }
 
-/// A phase, whatever its problem is.
+/// A phase, independent of the type of its problem.
 pub(super) trait Phase<T: Real> {
     fn size(&self) -> PhaseSize;
     fn names(&self) -> Names;
-    /// What a link at its end is to fit that leads to so many states.
+    /// Returns the dimensions that a link at its end must match; `begins` is the number of states
+    /// of the next phase.
     fn link_dims(&self, begins: usize) -> PhaseDims;
-    /// What a phase cannot be, of the first one or of another; then its start is free.
+    /// Returns a feature that phases do not support. Frees the start of every phase but the first.
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
     fn qp(&self) -> QpView<'_, T>;
     fn iterate(&self) -> &HeapSolution<T>;
     fn iterate_mut(&mut self) -> &mut HeapSolution<T>;
-    /// Bounds of constraints as they were given.
+    /// Returns the bounds of constraints as the user gave them.
     fn given_constraint_bounds(&mut self) -> [&[T]; 2];
-    /// Writes the QP at the iterate; the objective.
+    /// Writes the QP at the iterate, and returns the objective.
     fn linearise(&mut self, kind: Kind) -> Result<T, OcpError>;
     fn evaluate(&mut self, trial_point: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
-    /// The end at this point of the last stage.
+    /// Returns the end of the phase, at this point of its last stage.
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
     fn derivative(&self, error: &QpError) -> Option<OcpError>;
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>);
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>);
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// The first state of the iterate, as far as it is given.
+    /// Writes the fixed initial state to the iterate.
     fn set_given_initial_state(&mut self) {
         let model_states = self.names().model_state_count();
         let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
@@ -182,7 +184,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn derivative(&self, error: &QpError) -> Option<OcpError> {
         self.non_finite_derivative(error)
     }
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>) {
-        self.convexity_and_violation(asks)
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>) {
+        self.convexity_and_violation(needs_violation)
     }
 }

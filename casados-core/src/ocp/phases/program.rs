@@ -1,4 +1,4 @@
-//! What solvers ask of phases: each answers for its stages, and links for what is between them.
+//! The program of joined phases: each phase provides its stages, links the steps between phases.
 
 use super::link::{Link, PhaseEnd};
 use super::phase::{Kind, PhaseSize};
@@ -20,7 +20,8 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// What the curvature of [`Phases`] is of: of the dynamics of each phase.
+/// The type of dynamics that a [`Curvature`] of [`Phases`] is generic over; each phase linearises
+/// its own.
 ///
 /// No value has this type.
 ///
@@ -59,8 +60,8 @@ curvatures! {
     f32, GaussNewton, false;
 }
 
-/// Of these numbers alone: whoever had numbers of one's own could make a formulation of phases, and
-/// every formulation is a program.
+/// For `f64` and `f32` only: with a generic number this implementation would conflict with that for
+/// every [`Formulation`](crate::ocp::Formulation).
 macro_rules! programs {
     ($($number:ty),*) => {$(
         impl Program<$number> for Phases<'_, $number> {
@@ -119,7 +120,7 @@ macro_rules! programs {
                 error: &QpError,
             ) -> Option<OcpError> {
                 ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
-                    // What no phase has is of a link.
+                    // A non-finite number in no phase belongs to a link.
                     let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
                     let (_, phase) = ocp.problem.at(stage)?;
                     let function = phase.link.as_ref()?.name();
@@ -152,7 +153,7 @@ macro_rules! programs {
 
 programs!(f64, f32);
 
-/// Writes the QP at the iterate, and the objective.
+/// Writes the QP at the iterate, and returns the objective.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
     kind: Kind,
@@ -169,7 +170,8 @@ fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     problem.write_qp(qp, iterate, scratch, kind)
 }
 
-/// Ends of the intervals of a phase, with its parameters as states that stay, and its constraints.
+/// Writes the ends of the intervals of a phase, with its parameters as constant states, and its
+/// constraints.
 fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
     let PhaseSize { nx, free, intervals, .. } = size;
     let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
@@ -182,7 +184,7 @@ fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [
 }
 
 impl<T: Real> JoinedPhase<'_, T> {
-    /// Where the next phase begins: what the link makes of the end, and what is decided there.
+    /// Writes the start of the next phase: the states by the link, and the decided variables.
     fn write_start(
         &mut self,
         next: PhaseSize,
@@ -199,8 +201,8 @@ impl<T: Real> JoinedPhase<'_, T> {
     }
 }
 
-/// Where the next phase begins in the QP, at the last stage of a phase and its point `v` with
-/// multipliers `pi`.
+/// Writes the link to the QP at the last stage of a phase, at its point `v` with the multipliers
+/// `pi`.
 fn write_link_to_qp<T: Real>(
     link: &mut dyn Link<T>,
     end: PhaseEnd<'_, T>,
@@ -222,7 +224,7 @@ fn write_link_to_qp<T: Real>(
     let variable_count = size.nx + size.free;
     stage_conversion::write_start_columns(next, variable_count, columns, ld);
     if exact {
-        // The gradient of what is quadratic is `∇f − H v`: with another `H`.
+        // The gradient at zero is `∇f − H v`; it changes with `H`.
         add_symmetric(gradient, hessian, ld, v, n);
         let mut terms = QuadraticTerms { free: end.free, gradient: &mut [], hessian, ld };
         link.add_hessian(end, part(pi, 0, next.given_states), &mut terms);
@@ -236,7 +238,8 @@ fn write_link_to_qp<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
-    /// The objective at some point; in `ends` the ends of all intervals, and constraints.
+    /// Returns the objective at a point; writes the ends of all intervals, then constraints, to
+    /// `ends`.
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         trial_point: &Solution<T, D, M>,
@@ -265,7 +268,7 @@ impl<T: Real> Phases<'_, T> {
         Ok(objective)
     }
 
-    /// The QPs of all phases as that of the whole, with the links between them.
+    /// Writes the QPs of all phases, with the links between them, to the QP of the joined problem.
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: &mut Qp<T, D, M>,
@@ -291,7 +294,7 @@ impl<T: Real> Phases<'_, T> {
                 stage_conversion::copy_stage_qp(*size, &from, &mut arrays);
                 let v = part(v, begin, arrays.ld);
                 begin += arrays.ld;
-                // The last stage of a phase leads nowhere in its own QP.
+                // In the QP of a phase its last stage has no dynamics.
                 if let (Some(next), Some(link), true) = (next, &mut *link, stage_point.dynamics.is_empty()) {
                     let (end, sizes, point_and_costates) =
                         (problem.phase_end(stage_point), [*size, next], (v, point.dynamics));
@@ -310,7 +313,7 @@ impl<T: Real> Phases<'_, T> {
         Ok(())
     }
 
-    /// A constraint of the QP by its name in its phase.
+    /// Returns the name of a constraint of the QP in its phase.
     fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
         let unnamed = (Part::Dimensions, "");
         let find_name = || {

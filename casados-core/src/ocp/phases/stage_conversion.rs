@@ -1,11 +1,12 @@
-//! What goes from a phase to the whole and back: points with their multipliers, bounds, and QPs.
+//! Conversion between phases and the joined problem: points with their multipliers, bounds, and
+//! QPs.
 //!
 //! ```text
 //! stage of a phase   (x | w, u)        of the whole   (x, w | u)        w₊ = w
 //! ```
 //!
-//! The order of variables is the same: what are controls `w` of a phase, shared by its stages, are
-//! states of the whole.
+//! The order of variables is the same: the controls `w` of a phase, shared by its stages, are
+//! states of the joined problem.
 
 use super::phase::PhaseSize;
 use crate::qp::element::set;
@@ -15,8 +16,8 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 
-/// A point of the whole, at the stages of a phase, as one of the phase; `before` is the stage at
-/// which its start was decided, the result the one at its end.
+/// Reads a point of the joined problem at the stages of a phase. The start of the phase is decided
+/// at `previous_stage`; returns the last stage of the phase.
 pub(super) fn load_phase<'s, T: Real>(
     size: PhaseSize,
     from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
@@ -52,7 +53,7 @@ fn load_phase_stage<T: Real>(
     copy_common(to.dynamics, from.dynamics);
     copy_common(to.g_lower, from.g_lower);
     copy_common(to.g_upper, from.g_upper);
-    // What is decided has its bounds where it is.
+    // The multipliers of decided variables are at the stage before.
     if let Some(before) = previous_stage {
         for (from, x, u) in
             [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
@@ -65,7 +66,8 @@ fn load_phase_stage<T: Real>(
     }
 }
 
-/// A stage of a phase as one of the whole; with the first stage of the next phase, where it ends.
+/// Writes a stage of a phase to the joined problem, and to the last stage the start of the next
+/// phase.
 pub(super) fn store_phase_stage<T: Real>(
     PhaseSize { free, .. }: PhaseSize,
     from: &SolutionStage<'_, T>,
@@ -91,7 +93,8 @@ pub(super) fn store_phase_stage<T: Real>(
     }
 }
 
-/// What is decided where a phase begins, from its first stage, with the multipliers of its bounds.
+/// Writes the variables that are decided at the start of a phase, from its first stage, with the
+/// multipliers of their bounds.
 pub(super) fn write_start_variables<T: Real>(
     size: PhaseSize,
     first: &SolutionStage<'_, T>,
@@ -106,38 +109,38 @@ pub(super) fn write_start_variables<T: Real>(
     }
 }
 
-/// Of a vector over the first states and controls of a phase the elements that are decided where it
-/// begins: states that are free there, then free parameters.
+/// Gathers the elements that are decided at the start of a phase, from a vector over its first
+/// states and controls: free states, then free parameters.
 fn gather_start_variables<T: Real>(size: PhaseSize, x: &[T], u: &[T], to: &mut [T]) {
     let (states, parameters) = to.split_at_mut_checked(size.free_start_states().len()).unwrap_or_default();
     copy_common(states, x.get(size.free_start_states()).unwrap_or_default());
     copy_common(parameters, part(u, 0, size.free));
 }
 
-/// Six vectors of bounds and penalties.
+/// Returns the six vectors of bounds and penalties.
 fn bound_vectors<'a, T>(bounds: &Bounds<'a, T>) -> [&'a [T]; 6] {
     let Bounds { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = *bounds;
     [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
 }
 
-/// Six vectors of bounds and penalties.
+/// Returns the six vectors of bounds and penalties.
 fn bound_vectors_mut<T>(bounds: BoundsMut<'_, T>) -> [&mut [T]; 6] {
     let BoundsMut { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = bounds;
     [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
 }
 
-/// Where in a horizon of phases a stage is, for its bounds.
+/// The position of a stage among the phases, for its bounds.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum StagePosition {
-    /// The first stage of all: its states are given or decided.
+    /// The first stage of all phases: its states are fixed or decided.
     FirstStage,
     /// The first stage of another phase.
     PhaseStart,
     InteriorStage,
 }
 
-/// Bounds of a stage, without those of what is decided before it, and of integrals where these
-/// begin.
+/// Copies the bounds of a stage, except bounds of variables decided at the stage before, and of
+/// integrals at the start of a phase.
 pub(super) fn copy_stage_bounds<T: Real>(
     PhaseSize { nx, free, model_states: own, .. }: PhaseSize,
     from: &Stage<'_, T>,
@@ -167,7 +170,8 @@ pub(super) fn copy_stage_bounds<T: Real>(
     }
 }
 
-/// Bounds of what is decided where a phase begins, from its first stage.
+/// Writes the bounds of the variables that are decided at the start of a phase, from its first
+/// stage.
 pub(super) fn write_start_variable_bounds<T: Real>(
     size: PhaseSize,
     first: &Stage<'_, T>,
@@ -179,7 +183,8 @@ pub(super) fn write_start_variable_bounds<T: Real>(
     }
 }
 
-/// Where a phase begins: what is decided, and zero of what is neither decided nor given.
+/// Writes the decided elements of the first state of a phase; elements neither decided nor given
+/// are zero.
 pub(super) fn write_start_state<T: Real>(size: PhaseSize, start_variables: &[T], start: &mut [T]) {
     let (states, parameters) =
         start_variables.split_at_checked(size.free_start_states().len()).unwrap_or_default();
@@ -189,14 +194,14 @@ pub(super) fn write_start_state<T: Real>(size: PhaseSize, start_variables: &[T],
     copy_common(w, parameters);
 }
 
-/// The same as columns of the QP, where what is decided are the variables from `first` on.
+/// Writes the columns of [`write_start_state`] to the QP; the decided variables begin at `first`.
 pub(super) fn write_start_columns<T: Real>(size: PhaseSize, first: usize, columns: &mut [T], ld: usize) {
     for (j, state) in size.free_start_states().chain(size.nx..size.nx + size.free).enumerate() {
         set(columns, state * ld + first + j, T::ONE);
     }
 }
 
-/// The QP at a stage, without what leads to another phase.
+/// Copies the QP of a stage, without the link to the next phase.
 pub(super) fn copy_stage_qp<T: Real>(
     PhaseSize { nx, free, .. }: PhaseSize,
     from: &Stage<'_, T>,

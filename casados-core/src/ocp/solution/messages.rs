@@ -1,10 +1,10 @@
-//! What errors say: what, where by name, the values, and the way out.
+//! Messages of errors: the name and place, the values, and the remedy.
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
 use crate::qp::{QpField, Side};
 use core::fmt;
 
-/// The remedy where a function has no value, or no derivative.
+/// The remedy for functions and derivatives that are not finite.
 const OUTSIDE_DOMAIN: &str = "take another guess, or bounds that keep the variables inside its domain";
 
 impl Part {
@@ -266,7 +266,7 @@ impl fmt::Display for OcpError {
     }
 }
 
-/// Where it is, unless it is in one place alone.
+/// Writes the stage, unless the part belongs to one stage only.
 fn write_stage(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result {
     match part {
         Part::InitialState | Part::TerminalReference | Part::Memory => Ok(()),
@@ -274,7 +274,7 @@ fn write_stage(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Res
     }
 }
 
-/// One of the elements of a part, which are outputs of a function or have names of their own.
+/// Writes the name of an element of a part: an output of a function, or a variable.
 fn write_element_name(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fmt::Result {
     match part {
         Part::PathBounds | Part::TerminalBounds | Part::Reference | Part::TerminalReference => {

@@ -1,16 +1,15 @@
 //! The Cholesky factor of the controls of a stage, and substitutions with it.
 //!
-//! Where pivots of either sign are allowed, `M_uu = L S Lᵀ` with signs `S`, which the reciprocals
-//! of pivots have.
+//! With pivots of either sign, `M_uu = L S Lᵀ`, where the reciprocals of pivots have the signs `S`.
 
 use super::kernels::{Columns, Part, Source, product, splat, subtract, subtract_column};
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Real};
 
-/// Columns that are taken together: their triangle is in registers.
+/// The number of columns processed together, with their triangle in registers.
 const GROUP: usize = 4;
 
-/// The lower triangle of `W` columns of a panel, from a row on.
+/// Returns the lower triangle of `W` columns of a panel, from a row on.
 #[inline(always)]
 fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Option<[[T; W]; W]> {
     let mut block = [[T::ZERO; W]; W];
@@ -24,8 +23,8 @@ fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Opti
     Some(block)
 }
 
-/// `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of pivots,
-/// which their reciprocals have.
+/// Computes `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of
+/// the reciprocals of pivots.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn eliminate<T: Real, E: Packed<T>>(
@@ -57,7 +56,7 @@ pub fn eliminate<T: Real, E: Packed<T>>(
     }
 }
 
-/// The same of `W` columns, and of so many elements of `g`.
+/// As [`eliminate`], for `W` columns and `size` elements of `g`.
 #[inline(always)]
 fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
     g: &mut [T],
@@ -83,7 +82,7 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
     }
 }
 
-/// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
+/// Computes `u = −L⁻ᵀ u`, where `L` starts at row `row` of its panel.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
@@ -97,7 +96,7 @@ pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inve
     }
 }
 
-/// The same of `W` elements.
+/// As [`substitute`], for `W` elements.
 #[inline(always)]
 fn back_substitute_fixed<T: Real, const W: usize>(
     u: &mut [T],
@@ -117,7 +116,7 @@ fn back_substitute_fixed<T: Real, const W: usize>(
     }
 }
 
-/// The same of any number of elements.
+/// As [`substitute`], for any number of elements.
 #[inline(always)]
 fn back_substitute_any<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     for i in (0..u.len()).rev() {
@@ -130,8 +129,8 @@ fn back_substitute_any<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize,
     }
 }
 
-/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before
-/// `index`.
+/// Computes `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables
+/// before `index`.
 pub fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T], index: usize) {
     if let Some(d) = d.get_mut(index) {
         *d = T::ONE;
@@ -145,20 +144,20 @@ pub fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &
     }
 }
 
-/// What is kept of pivots.
+/// The results for the pivots.
 pub struct Pivots<'a, T> {
     pub inverse: &'a mut [T],
     pub added: &'a mut [T],
     /// The largest element of the diagonal.
     pub largest: T,
-    /// Whether negative pivots are pivots like others.
+    /// Whether negative pivots are accepted.
     pub indefinite: bool,
 }
 
-/// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the
-/// other rows of the panel are multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were
-/// replaced by something large: the solution then does not move in their direction. And the first
-/// of them that is negative, which may be rounding, and its index.
+/// Computes the Cholesky factor of a symmetric matrix, whose diagonal starts at row `row` of a
+/// panel; the other rows of the panel are multiplied by `L⁻ᵀ`. Returns the number of vanishing
+/// pivots, which are replaced by large numbers so that the solution has no component in their
+/// direction, and the index and value of the first negative one, which may be a rounding error.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn cholesky<T: Real, E: Packed<T>>(
@@ -180,7 +179,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
     let count = inverse.len();
     let mut begin = 0;
     while begin < count {
-        // Rows of a product begin at a multiple of its width.
+        // Rows of a product start at multiples of its width.
         let width = (count - begin).min(GROUP - (row + begin) % GROUP);
         let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
         if signed {
@@ -205,7 +204,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
             indefinite,
         };
         let found = match width {
-            // Firmware has one copy: flash is dearer than passes over a column.
+            // Firmware has one copy: code size matters more than passes over a column.
             _ if cfg!(not(feature = "std")) => factor_columns::<T, E>(group, width, rows, noise, pivots),
             1 => factor_group::<T, E, 1>(group, rows, noise, pivots),
             2 => factor_group::<T, E, 2>(group, rows, noise, pivots),
@@ -220,14 +219,14 @@ pub fn cholesky<T: Real, E: Packed<T>>(
     (regularised, negative)
 }
 
-/// What is said of the pivots of a group.
+/// The results for the pivots of a group.
 struct PivotReport<T> {
     regularised: usize,
     negative: Option<(usize, T)>,
     signed: bool,
 }
 
-/// The columns of a group, one after the other.
+/// Factorises the columns of a group, one after the other.
 #[inline(always)]
 fn factor_columns<T: Real, E: Packed<T>>(
     (group, ld, first): (&mut [T], usize, usize),
@@ -255,9 +254,9 @@ fn factor_columns<T: Real, E: Packed<T>>(
     all
 }
 
-/// `W` columns of a panel, of which what is left of them was subtracted: their diagonal block
-/// begins at row `first`. The block is factorised by itself, then all rows are multiplied by its
-/// `L⁻ᵀ` in registers. `inverse` is what the diagonal was before elimination.
+/// Factorises `W` columns of a panel after earlier columns were subtracted: their diagonal block
+/// starts at row `first`. The block is factorised first, then all rows are multiplied by its `L⁻ᵀ`
+/// in registers. `inverse` has the diagonal before elimination.
 #[inline(always)]
 fn factor_group<T: Real, E: Packed<T>, const W: usize>(
     (group, ld, first): (&mut [T], usize, usize),
@@ -299,7 +298,7 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
             }
         }
     }
-    // What is subtracted from the rows has the signs of pivots.
+    // The subtracted rows have the signs of pivots.
     let mut sizes = *inverse;
     for (column, size) in block.iter_mut().zip(&mut sizes) {
         if *size < T::ZERO {

@@ -2,8 +2,8 @@
 
 use crate::qp::error::{QpError, QpField};
 
-/// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that
-/// grows when a larger problem comes and never shrinks.
+/// Memory of a solver: an array or slice, or, with the feature `alloc`, a `Vec` that grows for
+/// larger problems and never shrinks.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -38,10 +38,10 @@ use crate::qp::error::{QpError, QpField};
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
 pub trait Store<T>: AsRef<[T]> + AsMut<[T]> {
-    /// At least so many elements.
+    /// Returns at least `length` elements.
     ///
     /// # Errors
-    /// [`QpError::Dimension`] or [`QpError::OutOfMemory`] if there are less.
+    /// [`QpError::Dimension`] or [`QpError::OutOfMemory`] if there are fewer.
     #[doc(hidden)]
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError>;
 }

@@ -30,26 +30,27 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
-/// it was at the start, or of one: an objective that becomes less leads no farther away.
+/// The largest ratio of violations after and before a step. The reference is at most the initial
+/// violation, or one: a decreasing objective must not lead far from feasible points.
 const MAX_VIOLATION_GROWTH: f64 = 10.0;
-/// The Hessian of the Lagrangian as it is.
+/// The Hessian of the Lagrangian without convexification.
 const EXACT_HESSIAN: Exact = Exact { convexification: Convexification::None };
 
-/// A search direction, and how far it may be gone.
+/// A search direction and its largest step lengths.
 struct SearchDirection {
     filter_model: FilterModel,
     tau: f64,
     max_alpha_primal: f64,
     max_alpha_dual: f64,
-    /// It moves nothing but rounding errors.
+    /// Whether all changes are of the size of rounding errors.
     is_tiny: bool,
-    /// Whether it has the changes of products.
+    /// Whether it has a higher-order correction.
     is_corrected: bool,
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
+    /// Writes the QP at the iterate. New slacks come with new multipliers, which the Hessian
+    /// contains.
     pub(super) fn linearise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -83,7 +84,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, and the best iterate.
+    /// Updates residuals, barrier parameter and best iterate.
     fn update_residuals<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -105,7 +106,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
-                barrier::barrier_residuals(&iterate.sides, self.options.final_mu);
+                barrier::barrier_residuals(&iterate.inequalities, self.options.final_mu);
         }
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
         let stage_residual = if P::LIFTED { of_stages } else { 0.0 };
@@ -136,7 +137,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
         let worst = elastic_mode::largest_elastic_violation(ocp, state, (work.saved_penalties, work.units));
         let overall_error = nan_max(state.nlp_error, worst.map_or(0.0, |worst| worst.violation));
-        // Bounds are what they were given as, whatever their penalties are.
+        // Violations of the given bounds count, also if bounds have penalties.
         let hard = elastic_mode::largest_elastic_violation(ocp, state, (work.saved_penalties, &[]))
             .map_or(0.0, |worst| worst.violation);
         log_row.residuals.inequalities = nan_max(log_row.residuals.inequalities, hard);
@@ -152,7 +153,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Barrier function and violation at the iterate.
+    /// Returns barrier function and violation at the iterate.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -173,7 +174,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             dimensions.units(workspace.units),
         );
         if P::LIFTED {
-            // The QP has the ends of intervals where the next step would lead to.
+            // The QP contains the ends of intervals that the next step of the stages leads to.
             let mut line_search = LineSearch {
                 dimensions: &dimensions,
                 kkt_numbers,
@@ -192,7 +193,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(current_pair)
     }
 
-    /// What is to be expected along the search direction, and how far it may be gone.
+    /// Computes the filter model along the search direction, and the largest step lengths.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -215,7 +216,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let expected = FilterModel {
             current: here,
             slope: slope / objective_unit,
-            // Of the function and of the point.
+            // Rounding errors of the function and of the point.
             noise: 10.0 * f64::EPSILON * (here.objective.abs() + terms / objective_unit),
             theta_min: state.theta_min,
             max_violation: (MAX_VIOLATION_GROWTH * here.violation.min(reference_violation))
@@ -225,7 +226,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             rounding_violation: rounding,
         };
         let tau = barrier::fraction_to_boundary(state.mu / objective_unit);
-        let (primal, dual) = predictor::step_lengths(&iterate.sides, tau);
+        let (primal, dual) = predictor::step_lengths(&iterate.inequalities, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
@@ -239,8 +240,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         })
     }
 
-    /// How far the search direction is gone. A corrected one is gone as far as it may be, or
-    /// not at all: then the direction is that without the correction.
+    /// Returns the step length. A corrected direction is taken at its full length; if the filter
+    /// rejects it, the line search uses the direction without correction.
     fn line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -288,7 +289,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         line_search!(workspace).search(ocp, state, expected, *primal, *tau)
     }
 
-    /// Goes the step that was accepted.
+    /// Applies the accepted step.
     fn apply_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -302,10 +303,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.units = &*core::mem::take(&mut work.units);
         let (AcceptedStep { alpha, corrected }, mut dual) = (accepted, direction.max_alpha_dual);
         if corrected {
-            dual =
-                max_step_to_boundary(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+            dual = max_step_to_boundary(
+                iterate.inequalities.multiplier,
+                iterate.inequalities.multiplier_step,
+                direction.tau,
+            );
         }
-        if needs_equal_step_lengths(&iterate.sides) {
+        if needs_equal_step_lengths(&iterate.inequalities) {
             dual = dual.min(alpha);
         }
         costates_after_step(&mut iterate, &mut work, T::from_f64(state.delta_w));
@@ -313,17 +317,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         for (pi, &after) in view.dynamics.iter_mut().zip(&*work.next_costates) {
             *pi = *pi + alpha_number * (after - *pi);
         }
-        let multipliers_and_steps = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        let multipliers_and_steps =
+            iterate.inequalities.multiplier.iter().zip(&*iterate.inequalities.multiplier_step);
         for (of_hessian, (&multiplier, &step)) in
             work.hessian_multipliers.iter_mut().zip(multipliers_and_steps)
         {
             *of_hessian = *of_hessian + alpha_number * (multiplier + step - *of_hessian);
         }
-        iterate.go(alpha_number, T::from_f64(dual));
-        barrier::correct_bound_multipliers(&mut iterate.sides, state.mu);
+        iterate.step_point(alpha_number, T::from_f64(dual));
+        barrier::correct_bound_multipliers(&mut iterate.inequalities, state.mu);
         iterate.store(&mut view);
         ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
-        // The line search ends where it accepts a point; a tiny step has none.
+        // The line search has evaluated the accepted point; a tiny step has no line search.
         ocp.algebraic_is_current = !direction.is_tiny;
         Ok(())
     }
@@ -380,7 +385,7 @@ where
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
-                // A derivative that is not finite is another error.
+                // A non-finite derivative ends the run with an error.
                 ocp.qp_failure_status(error)?;
                 return Ok(self.recover_from_failed_step(ocp, state));
             }
@@ -419,7 +424,7 @@ where
     ) -> bool {
         let restarts = self.try_restart(ocp, state, final_status);
         if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
-            // That is said of the last iterate.
+            // The verdict holds at the last iterate.
             state.best_iteration = *log_row;
         }
         restarts

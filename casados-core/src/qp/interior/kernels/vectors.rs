@@ -1,14 +1,14 @@
-//! Products with vectors, in registers.
+//! Products with vectors, by SIMD.
 
 use super::{Columns, splat};
 use crate::qp::element::get;
 use crate::scalar::{Packed, Real, Registers};
 
-/// Registers that a vector is held in at a time.
+/// The number of registers of a vector that are held at a time.
 const ACCUMULATORS: usize = 4;
 
-/// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
-/// be zero in one of them.
+/// Computes `target + Xᵀ v`: `columns` dot products of columns of `X` with `v`, of `rows` elements.
+/// The padding of one factor must be zero.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn add_transposed<T: Real, E: Packed<T>>(
@@ -34,7 +34,7 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
     }
 }
 
-/// The same over `R` registers.
+/// As [`add_transposed`], over `R` registers.
 #[inline(always)]
 fn add_dots<T: Real, E: Packed<T>, const R: usize>(target: &mut [T], x: Columns<'_, T>, v: &[E::Cell]) {
     let Some(cells) = v.first_chunk::<R>() else { return };
@@ -54,8 +54,8 @@ fn add_dots<T: Real, E: Packed<T>, const R: usize>(target: &mut [T], x: Columns<
     }
 }
 
-/// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything.
-/// Target and `v` are padded, `v` with zeros.
+/// Computes `target + H v` with a symmetric matrix stored by its lower triangle; elements above the
+/// diagonal are ignored. Target and `v` are padded, `v` with zeros.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
@@ -72,8 +72,8 @@ pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v:
     }
 }
 
-/// What `R` registers of rows below the diagonal add to their own rows, and their transpose to the
-/// rows of their columns; with the diagonal.
+/// Adds the products of `R` registers of rows below the diagonal, of their transpose and of the
+/// diagonal.
 #[inline(always)]
 fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
     target: &mut [T],
@@ -115,7 +115,7 @@ fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
     }
 }
 
-/// `target + H v` as [`symmetric`], for whoever is not in registers yet.
+/// Computes `target + H v` as [`symmetric`], for callers outside a SIMD kernel.
 pub fn add_symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     T::registers(AddSymmetric { target, h, ld, v, n });
 }
@@ -135,7 +135,7 @@ impl<T: Real> Registers<T> for AddSymmetric<'_, T> {
     }
 }
 
-/// `target − factor · column`
+/// Computes `target − factor · column`.
 #[inline(always)]
 pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, column: &[T]) {
     let factor = splat::<T, E>(factor);
@@ -144,7 +144,7 @@ pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, colum
     }
 }
 
-/// `target · factor`
+/// Computes `target · factor`.
 #[inline(always)]
 pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     let factor = splat::<T, E>(factor);
@@ -153,10 +153,10 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     }
 }
 
-/// The most lanes there are.
+/// The maximum number of lanes.
 const MAX_LANES: usize = 8;
 
-/// `0, 1, 2, …` in the lanes of a register.
+/// Returns `0, 1, 2, …` in the lanes of a register.
 #[inline(always)]
 fn lane_indices<T: Real, E: Packed<T>>() -> E {
     let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
@@ -166,7 +166,7 @@ fn lane_indices<T: Real, E: Packed<T>>() -> E {
     E::load(&index)
 }
 
-/// The upper triangle from the lower one.
+/// Copies the lower triangle to the upper one.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
@@ -186,7 +186,7 @@ pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
     }
 }
 
-/// The same of a matrix whose columns are one register each.
+/// As [`mirror`], for a matrix whose columns are one register each.
 #[inline(always)]
 fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
     let mut own = [E::from_f64(0.0); MAX_LANES];
@@ -242,7 +242,8 @@ mod tests {
     use super::*;
     use alloc::vec::Vec;
 
-    /// The definition, with what must not be read above the diagonal.
+    /// The products by their definition; elements above the diagonal, which must not be read, are
+    /// NaN.
     #[test]
     fn symmetric_products_of_all_sizes() {
         for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {

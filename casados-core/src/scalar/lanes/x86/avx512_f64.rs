@@ -28,8 +28,7 @@ wrap! {
 define! {
     transpose(rows: [Register; 8]) -> [Register; 8] {{
         let [a, b, c, d, e, f, g, h] = rows;
-        // Pairs of rows; of two of these the quarters that are even and those that are odd,
-        // twice.
+        // Pairs of rows; then the even and the odd quarters of two pairs, twice.
         let even = [
             _mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h),
         ];
@@ -40,7 +39,7 @@ define! {
         let [b, d, f, h] = quarters(odd);
         [a, b, c, d, e, f, g, h]
     }}
-    /// The first quarters of all, the second, the third, the fourth.
+    /// All first quarters, all second, third, and fourth ones.
     quarters(rows: [Register; 4]) -> [Register; 4] {{
         let [a, b, c, d] = rows;
         let (even, odd) = (
