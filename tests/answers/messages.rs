@@ -172,3 +172,25 @@ fn messages_about_vanishing_constraint_gradients() {
     let numbers: Vec<u32> = rank.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     assert!(matches!(numbers[..], [full, points] if 0 < full && full < points), "{rank}");
 }
+
+/// Of a model without parameters none is listed, and one reference *is* at stages.
+#[test]
+fn of_what_there_is_none() -> Test {
+    let problem = Problem::new(casados::ocp::Map::<Push, f64>::new())
+        .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]));
+    let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;
+    let message = ocp.free("mass", 0.0..=1.0, 0.5).err().map(|error| error.to_string());
+    assert_eq!(message.as_deref(), Some("`Push` has no parameter `mass`: it has none"));
+    let message = ocp.set_reference(3.., &[0.0; 2]).err().map(|error| error.to_string());
+    let expected = "there is no stage 3: the reference of the stage cost is at stages 0 to 2";
+    assert_eq!(message.as_deref(), Some(expected));
+    Ok(())
+}
+#[function]
+fn push(x: f64, u: f64) -> f64 {
+    x + u
+}
+#[function]
+fn both(x: f64, u: f64) -> [f64; 2] {
+    [x, u]
+}

@@ -96,6 +96,24 @@ fn warm_starts_close_to_bounds() -> Test {
     Ok(())
 }
 
+/// Beside a bound at zero, where the smallest numbers are, too.
+#[test]
+fn the_smallest_push_beside_zero() -> Test {
+    for push in [f64::MIN_POSITIVE, 1e-300, 1e-30, 1e-20, 1e-12] {
+        let problem =
+            Problem::new(Map::<Drive, f64>::new()).stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]));
+        let mut ocp = problem.on(Horizon::uniform(4, 1.0))?;
+        ocp.fix_initial_state(&[-1.0])?.bound("u", .., 0.0, 2.0)?.guess(&[-1.0], &[0.0])?;
+        let mut ipm = HeapIpm::new(&ocp)?;
+        (ipm.options.warm_start, ipm.options.warm_push) = (true, push);
+        let outcome = ipm.solve(&mut ocp)?;
+        // `P₃ = 1`, `P₂ = 1.5`, `P₁ = 1.6`: `u₀ = 1.6/2.6`, no bound is active.
+        let u = ocp.stage(0)?.u[0];
+        assert!(outcome.is_converged() && (u - 1.6 / 2.6).abs() < 1e-6, "{push:e}: {u} {outcome}");
+    }
+    Ok(())
+}
+
 #[ode]
 mod cart {
     #[derive(Debug, PartialEq, Record)]

@@ -180,11 +180,11 @@ fn bounded_problems_with_large_solutions() -> Test {
             assert!(outcome.is_converged(), "{c:e}: {outcome}");
             assert!((outcome.objective / (17.5 * c * c) - 1.0).abs() < 1e-6, "{c:e}: {outcome}");
         }
-        // A QP that is not solved is no derivative without a value.
+        // States have no bounds and a guess of zero: their unit is that of the control.
         let mut ocp = bounded(plain.on(horizon())?, c, upper)?;
         let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
         let objective = outcome.objective / (17.5 * c * c);
-        assert!(!outcome.is_converged() || (objective - 1.0).abs() < 1e-6, "{c:e}: {outcome}");
+        assert!(outcome.is_converged() && (objective - 1.0).abs() < 1e-6, "{c:e}: {outcome}");
     }
     Ok(())
 }
@@ -202,5 +202,43 @@ fn iterations_of_infeasible_qps() -> Test {
     let outcome = sqp.solve(&mut ocp)?;
     assert!(matches!(outcome.status, Status::InfeasibleQp { .. }), "{outcome}");
     assert!(outcome.qp_iterations > 0, "{outcome}");
+    Ok(())
+}
+
+/// From rest over one metre in one interval of a second: `u = 2`. The second control does nothing.
+#[ode]
+fn pushed(x: [f64; 2], u: [f64; 2]) -> [f64; 2] {
+    [x[1], u[0]]
+}
+#[function]
+fn first_squared(_x: [f64; 2], u: [f64; 2]) -> f64 {
+    u[0] * u[0]
+}
+
+/// What the equations alone determine takes a step, and one more for its multiplier.
+#[test]
+fn one_interval_and_a_control_without_effect() -> Test {
+    let mut ocp = Problem::new(Erk::<Pushed, Rk4>::new(Options::default())?)
+        .running_cost(GeneralCost::<FirstSquared>::new())
+        .on(Horizon::uniform(1, 1.0))?;
+    ocp.fix_initial_state(&[0.0; 2])?.guess(&[0.0; 2], &[0.0; 2])?.bound("x[0]", 1.., 1.0, 1.0)?;
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged() && outcome.iterations <= 5, "{outcome}");
+    assert!((ocp.stage(0)?.u[0] - 2.0).abs() < 1e-9, "{outcome}");
+    Ok(())
+}
+
+/// From zero no control within one reaches two: with penalties in place of bounds, too, residuals
+/// are those of the bounds that were given.
+#[test]
+fn violations_of_an_infeasible_problem_are_in_its_residuals() -> Test {
+    let problem = Problem::new(Map::<Add, f64>::new()).stage_cost(GeneralCost::<Squares>::new());
+    let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;
+    ocp.fix_initial_state(&[0.0])?.bound("u", .., -0.5, 0.5)?.bound("x", 3.., 2.0, 3.0)?;
+    ocp.guess(&[0.0], &[0.0])?;
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    let Status::Infeasible { violation, .. } = outcome.status else { return Err(outcome.to_string().into()) };
+    let distance = 2.0 - ocp.stage(3)?.x[0];
+    assert!((violation - 0.5).abs() < 1e-3 && distance <= outcome.residuals.inequalities, "{outcome}");
     Ok(())
 }

@@ -257,3 +257,29 @@ fn smoother_of_a_random_walk() -> Test {
     assert!((covariance.variance("x", N)? - dense[(N - 1, N - 1)]).abs() < 1e-13);
     Ok(())
 }
+
+/// Of two parameters only the product is seen.
+#[function]
+fn stays(x: [f64; 3]) -> [f64; 3] {
+    x
+}
+#[function]
+fn product(x: [f64; 3]) -> [f64; 2] {
+    [10.0 * (x[0] - 1.0), 10.0 * (x[1] * x[2] - 2.0)]
+}
+
+/// Four samples with a standard deviation of 0.1: the mean has 0.05.
+#[test]
+fn estimates_as_a_table() -> Test {
+    let cost = || LeastSquaresCost::<Product>::diagonal(&[1.0; 2]);
+    let problem = Problem::new(Map::<Stays, f64>::new()).stage_cost(cost()).terminal_cost(cost());
+    let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;
+    ocp.free_initial_state().guess(&[1.0, 2.0, 1.0], &[])?;
+    let text = ocp.covariance(GaussNewton::default())?.to_string();
+    let seen = "x[0]  1.0000e0 ± 5.00e-2              1.0000e0 ± 5.00e-2";
+    let unseen = "x[1]  2.0000e0 ± not identifiable     2.0000e0 ± not identifiable";
+    let lines: Vec<_> = text.lines().map(str::trim_end).collect();
+    assert_eq!(lines[1..3], [seen, unseen], "{text}");
+    assert_eq!(lines.last(), Some(&"not identifiable: +1.00 x[1] -0.50 x[2]"), "{text}");
+    Ok(())
+}

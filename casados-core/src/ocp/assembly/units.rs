@@ -34,7 +34,7 @@ pub(in crate::ocp) struct ProblemScaling {
     /// The unit of the objective and of multipliers.
     pub objective_unit: f64,
     /// The smallest unit of a row, at most one.
-    pub tolerance: f64,
+    pub min_row_unit: f64,
 }
 
 /// The units of a problem.
@@ -49,6 +49,19 @@ pub(in crate::ocp) struct ScalingUnits<'a, T> {
 /// of larger units.
 pub(in crate::ocp) fn tolerance_factor(unit: f64) -> f64 {
     unit.min(1.0).max(unit / NEAR_ONE_RATIO)
+}
+
+/// The unit of products of slacks and multipliers at the end of a run, for this value of the
+/// objective: the sum of products is the distance of the objective from its minimum.
+///
+/// It is at most the objective unit, which contains the units of variables, however distant their
+/// origins, and at least that or one, whichever is smaller.
+pub(in crate::ocp) fn product_unit(objective: f64, objective_unit: f64) -> f64 {
+    if objective.is_finite() {
+        objective.abs().clamp(objective_unit.min(1.0), objective_unit)
+    } else {
+        objective_unit
+    }
 }
 
 /// The smallest and the largest magnitude of a quantity.
@@ -96,6 +109,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let last = span.end.saturating_sub(1);
             let (path, terminal) = (span.start..last, last..span.end);
             let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
+            // Zero for states without bounds whose guess is zero.
             for i in 0..nx + nu {
                 // Shared controls have one unit over all stages, other controls of the last stage
                 // their own.
@@ -103,6 +117,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 let stages = if is_single_variable { span.clone() } else { path.clone() };
                 set_variable_unit(qp, v, (stages, i), rows);
             }
+            (0..nx).for_each(|i| set_driven_state_unit(qp, (span.clone(), i), rows));
             let last_controls = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..last_controls).filter(|&j| !is_marked(qp.shared(), j)) {
                 set_variable_unit(qp, v, (terminal.clone(), nx + j), rows);
@@ -115,24 +130,26 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         let force = compute_objective_unit(qp, v, rows, scratch);
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
-        ProblemScaling { objective_unit: force, tolerance: least.to_f64() }
+        ProblemScaling { objective_unit: force, min_row_unit: least.to_f64() }
     }
 
     /// Returns a smaller objective unit if objective and gradient at the iterate are below a
     /// hundredth of the present one. For example, a cost `(x − r)²` with a large `r` is large at
-    /// the guess, and small at a solution nearby. `rows` are the units of rows, `min_row_unit` is
-    /// the smallest tolerance of residuals in units of the objective.
+    /// the guess, and small at a solution nearby. `rows` are the units of rows, `tolerance` is
+    /// the smallest tolerance of residuals in units of the objective. With `counts_changes` the
+    /// unit also covers the changes of the gradient, whose rounding errors the gradient has.
     pub(in crate::ocp) fn reduced_objective_unit(
         &self,
         rows: &[T],
         objective_unit: f64,
-        min_row_unit: f64,
+        (tolerance, counts_changes): (f64, bool),
         scratch: &mut [T],
     ) -> Option<f64> {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        let [slope, _] = largest_gradient_and_change(qp, v, rows, scratch);
-        let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
-        let smaller_unit = size.max(ROUNDING_ERROR_MARGIN * T::EPSILON / min_row_unit * objective_unit);
+        let [slope, change] = largest_gradient_and_change(qp, v, rows, scratch).map(T::to_f64);
+        let size = slope.max(self.objective.abs().to_f64()).max(1.0);
+        let terms = if counts_changes { objective_unit.max(change) } else { objective_unit };
+        let smaller_unit = size.max(ROUNDING_ERROR_MARGIN * T::EPSILON / tolerance * terms);
         (smaller_unit * NEAR_ONE_RATIO < objective_unit).then_some(smaller_unit)
     }
 
@@ -167,6 +184,19 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         SUM_ROUNDING_FACTOR * T::EPSILON * largest.to_f64()
     }
+
+    /// The rounding error of gradients: a multiple of the unit roundoff times the largest product
+    /// of a curvature and a variable of the iterate.
+    pub(in crate::ocp) fn gradient_rounding_error(&self) -> f64 {
+        let ((v, _), mut largest) = (self.iterate.variables_and_costates(), T::ZERO);
+        for (place, stage) in StageOffsetsIter::<T>::new(self.qp.dims()).zip(self.qp().stages()) {
+            let curvatures = stage.arrays().hessian.iter().step_by(place.ld + 1);
+            for (&curvature, &v) in curvatures.zip(part(v, place.v, place.n)) {
+                largest = largest.max((curvature * v).abs());
+            }
+        }
+        SUM_ROUNDING_FACTOR * T::EPSILON * largest.to_f64()
+    }
 }
 
 /// Computes the unit of a variable over all stages, from its guess and bounds; one if it is near
@@ -197,10 +227,39 @@ fn set_variable_unit<T: Real>(
     if range.largest > 0.0 || guess > T::ONE {
         range.add(guess);
     }
-    let unit = range.unit_unless_near_one();
+    let is_state = variable_places().next().is_some_and(|place| i < place.nx);
+    let is_unknown = is_state && range.largest == 0.0 && guess == T::ZERO;
+    let unit = if is_unknown { T::ZERO } else { range.unit_unless_near_one() };
     for place in variable_places() {
         set(units, place.row + i, unit);
     }
+}
+
+/// Computes the unit of a state without bounds whose guess is zero: the change by controls in an
+/// interval, at least one, since states accumulate such changes.
+///
+/// Changes by other states are ignored: large terms of dynamics cancel.
+fn set_driven_state_unit<T: Real>(qp: QpView<'_, T>, of: (Stages<usize>, usize), units: &mut [T]) {
+    let (stages, i) = of;
+    let variable_places =
+        || StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
+    let unit = variable_places().next().map_or(T::ONE, |place| at(units, (place.row + i) as u32));
+    if unit > T::ZERO {
+        return;
+    }
+    let mut driven = T::ZERO;
+    for (place, stage) in
+        variable_places().zip(qp.stages().skip(stages.start)).filter(|(place, _)| i < place.next)
+    {
+        let column = part(stage.arrays().matrix, i * place.ld + place.nx, place.nu);
+        for (&b, &unit) in column.iter().zip(part(units, place.row + place.nx, place.nu)) {
+            driven = driven.max((b * unit).abs());
+        }
+    }
+    let mut range = MagnitudeRange::EMPTY;
+    range.add(driven.max(T::ONE));
+    let unit = range.unit_unless_near_one();
+    variable_places().filter(|place| i < place.nx).for_each(|place| set(units, place.row + i, unit));
 }
 
 /// Computes the unit of a constraint over stages, from its gradients and its distance from its

@@ -94,7 +94,8 @@ impl fmt::Display for OcpError {
                 Ok(())
             }
             Self::NoSuchStage { part, stage, stages } => {
-                write!(f, "there is no stage {stage}: {part} are at stages 0 to {}", stages.saturating_sub(1))
+                let (are, last) = (if part.verb() == "has" { "is" } else { "are" }, stages.saturating_sub(1));
+                write!(f, "there is no stage {stage}: {part} {are} at stages 0 to {last}")
             }
             Self::EmptyRange { part, start, end, stages } => write!(
                 f,
@@ -247,7 +248,11 @@ impl fmt::Display for OcpError {
                  between 0 and 1"
             ),
             Self::UnknownParameter { name, known } => {
-                write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;
+                write!(f, "`{}` has no parameter `{}`: ", known.model, name.as_str())?;
+                if known.p.is_empty() {
+                    return f.write_str("it has none");
+                }
+                f.write_str("its parameters are")?;
                 write_names(f, known.p)
             }
             Self::OutOfRange { name, value, lower, upper } => {

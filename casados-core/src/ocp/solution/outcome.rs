@@ -248,7 +248,9 @@ impl Status {
             Self::QpFailed(QpError::NotConvex { .. }) => {
                 ". Take another guess, or `Convexification::Reduced` if another one was set"
             }
-            Self::QpFailed(_) => ". Take another guess",
+            Self::QpFailed(_) => {
+                ". Soften bounds that are violated (`Ocp::soften`), or take another guess or the other solver"
+            }
             Self::NoProgress => {
                 ". Violated bounds: `ocp.solution()?.violations(1e-6)`. Take another guess; with `Sqp` also \
                  `Globalisation::Filter`, exact Hessians (`Sqp::exact`) or a smaller `options.shortest_step`"

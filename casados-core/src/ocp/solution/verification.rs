@@ -58,6 +58,25 @@ pub struct Verification<T = f64> {
 }
 
 /// The defect of a state: the end of an interval minus the start of the next one.
+///
+/// ```
+/// # use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// # use casados::prelude::*;
+/// # #[ode]
+/// # fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u - 9.81 * x[0].sin()] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u * u }
+/// # let mut ocp = Problem::new(Erk::<Pendulum, Heun>::new(Options::default())?)
+/// #     .running_cost(GeneralCost::<Effort>::new())
+/// #     .on(Horizon::uniform(10, 0.2))?;
+/// # ocp.fix_initial_state(&[1.0, 0.0])?.bound("x", 10.., 0.0, 0.0)?.guess(&[0.5, 0.0], &[0.0])?;
+/// # HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// # let mut adaptive = Adaptive::<Pendulum, Radau>::new(AdaptiveOptions::default())?;
+/// for defect in ocp.verify(&mut adaptive)?.defects().iter().filter(|defect| defect.relative > 1e-3) {
+///     println!("{} in interval {}: {:.1e}", defect.state, defect.interval, defect.amount);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Defect<T = f64> {
@@ -73,6 +92,27 @@ pub struct Defect<T = f64> {
 }
 
 /// A bound that is violated between two nodes.
+///
+/// ```
+/// # use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// # use casados::prelude::*;
+/// # #[ode]
+/// # fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u - 9.81 * x[0].sin()] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u * u }
+/// # let mut ocp = Problem::new(Erk::<Pendulum, Heun>::new(Options::default())?)
+/// #     .running_cost(GeneralCost::<Effort>::new())
+/// #     .on(Horizon::uniform(10, 0.2))?;
+/// # ocp.fix_initial_state(&[1.0, 0.0])?.bound("x", 10.., 0.0, 0.0)?.guess(&[0.5, 0.0], &[0.0])?;
+/// // The angle is bounded at nodes only: between them it is larger.
+/// ocp.bound("x[0]", 1..10, 0.2, 1.2)?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// # let mut adaptive = Adaptive::<Pendulum, Radau>::new(AdaptiveOptions::default())?;
+/// for violation in ocp.verify(&mut adaptive)?.violations() {
+///     println!("{} at {:.2} s: {:.1e}", violation.name, violation.time, violation.amount);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct InnerViolation<T = f64> {

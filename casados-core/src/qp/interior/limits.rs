@@ -22,9 +22,8 @@ pub struct ResidualTolerances<T> {
 }
 
 impl<T: Real> ResidualTolerances<T> {
-    /// The tolerances of the options, at least `relaxed`.
-    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: PenaltyMode, scaled: bool) -> Self {
-        let values = T::from_f64(options.tolerance).max(relaxed);
+    /// The tolerances of residuals up to `values`.
+    pub fn new(options: &InteriorPointOptions, values: T, penalties: PenaltyMode, scaled: bool) -> Self {
         // A certificate of infeasibility requires small gradients.
         let share = if penalties == PenaltyMode::Hard { 0.01 } else { 1.0 };
         // Units are estimates.

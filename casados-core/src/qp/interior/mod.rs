@@ -102,6 +102,8 @@ pub struct InteriorPoint<T, N, I> {
     pub options: InteriorPointOptions,
     /// The permitted residual, if it is above the tolerance of the options.
     permitted_residual: T,
+    /// The required residual, if it is below the tolerance of the options.
+    required_residual: T,
     /// The limit of iterations per call, set by [`QpSolver::limit`].
     limit: Option<usize>,
     numbers: N,
@@ -186,6 +188,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         Self {
             options: InteriorPointOptions::new::<T>(),
             permitted_residual: T::ZERO,
+            required_residual: T::from_f64(f64::INFINITY),
             limit: None,
             numbers,
             indices,
@@ -240,12 +243,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if reading.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
-        let limits = ResidualTolerances::new(
-            &self.options,
-            self.permitted_residual,
-            attempt.penalties,
-            found.is_some(),
-        );
+        let tolerance =
+            T::from_f64(self.options.tolerance).min(self.required_residual).max(self.permitted_residual);
+        let limits = ResidualTolerances::new(&self.options, tolerance, attempt.penalties, found.is_some());
         T::run_precompiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -360,5 +360,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
 
     fn permit(&mut self, tolerance: f64) {
         self.permitted_residual = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
+    }
+
+    fn require(&mut self, tolerance: f64) {
+        self.required_residual = T::from_f64(if tolerance > 0.0 { tolerance } else { f64::INFINITY });
     }
 }

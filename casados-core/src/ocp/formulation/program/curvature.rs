@@ -72,7 +72,7 @@ pub trait Curvature<D, T: Real>: Copy {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GaussNewton {
-    /// The convexification of general costs.
+    /// The convexification of general costs. Default [`Convexification::Project`].
     pub convexification: Convexification,
 }
 

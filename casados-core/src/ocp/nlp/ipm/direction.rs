@@ -81,7 +81,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         log_row: &mut Iteration,
     ) -> Result<bool, QpError> {
         let objective_unit = state.dimensions.scaling.objective_unit;
-        let min_mu = objective_unit * barrier::min_mu(self.options.barrier_tolerance(objective_unit));
+        let min_mu = barrier::min_mu(self.options.product_tolerance(state.product_unit));
         let units = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units;
         let mut iterate =
             kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;

@@ -110,15 +110,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
         let units = state.dimensions.units(work.units);
+        state.update_product_unit(objective);
+        let scaled =
+            scaled_residuals(&residuals, &iterate, view.dynamics, (units, state.product_unit), of_stages);
+        state.update_mu(&iterate, &scaled, &self.options);
         let ScaledResiduals {
-            barrier_residuals: barrier,
+            barrier_residuals: (barrier, _),
             nlp_error: error,
             error_without_complementarity: others,
-        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, of_stages);
-        state.update_mu(&iterate, (&barrier.0, barrier.1), &self.options);
+        } = scaled;
         state.update_nlp_error(error, others, &self.options);
-        state.largest_gap = barrier.0.dynamics;
-        state.violation = nan_max(state.largest_gap, barrier.0.inequalities);
+        state.largest_gap = barrier.dynamics;
+        state.violation = nan_max(state.largest_gap, barrier.inequalities);
         let in_restoration = state.dimensions.in_restoration;
         if in_restoration {
             state.restoration.update_violations(&iterate, view.dynamics, state.largest_gap, units);
@@ -128,6 +131,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
         let worst = elastic_mode::largest_elastic_violation(ocp, state, (work.saved_penalties, work.units));
         let overall_error = nan_max(state.nlp_error, worst.map_or(0.0, |worst| worst.violation));
+        // Violations of the given bounds count, also if bounds have penalties.
+        let hard = elastic_mode::largest_elastic_violation(ocp, state, (work.saved_penalties, &[]))
+            .map_or(0.0, |worst| worst.violation);
+        log_row.residuals.inequalities = nan_max(log_row.residuals.inequalities, hard);
         let is_best = overall_error < state.best_residual || state.best_residual.is_nan();
         if !in_restoration && is_best || log_row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (overall_error, *log_row);
@@ -199,10 +206,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
         let (equation_residual, of_equations) = equation_residuals_after_step(&iterate, work.units);
         let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + of_equations;
+        let objective_unit = state.dimensions.scaling.objective_unit;
+        let (slope, terms) = barrier_function::barrier_slope(&iterate, state.mu, work.scratch);
         let expected = FilterModel {
             current: here,
-            slope: barrier_function::barrier_slope(&iterate, state.mu, work.scratch)
-                / state.dimensions.scaling.objective_unit,
+            slope: slope / objective_unit,
+            // Rounding errors of the function and of the point.
+            noise: 10.0 * f64::EPSILON * (here.objective.abs() + terms / objective_unit),
             theta_min: state.theta_min,
             max_violation: (MAX_VIOLATION_GROWTH * here.violation.min(reference_violation))
                 .max(reference_violation),
@@ -211,7 +221,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             rounding_violation: rounding,
             equation_residual,
         };
-        let tau = barrier::fraction_to_boundary(state.mu / state.dimensions.scaling.objective_unit);
+        let tau = barrier::fraction_to_boundary(state.mu / objective_unit);
         let (primal, dual) = predictor::step_lengths(&iterate.inequalities, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
@@ -396,9 +406,9 @@ where
         state.count_stalled_step(log_row.step);
         state.regularisation.update_damping(log_row.step / direction.max_alpha_primal);
         self.apply_step(ocp, state, &direction, accepted)?;
-        let tolerance_unit = tolerance_factor(state.dimensions.scaling.objective_unit);
-        let min_mu = (self.options.tolerance * tolerance_unit).max(self.options.final_mu);
-        let is_finished = direction.is_tiny && state.mu <= min_mu;
+        let min_mu = self.options.tolerance * tolerance_factor(state.product_unit);
+        let stalls = state.count_tiny_step(direction.is_tiny);
+        let is_finished = stalls && state.mu <= min_mu.max(self.options.final_mu);
         Ok(is_finished.then_some(Status::NoProgress))
     }
 

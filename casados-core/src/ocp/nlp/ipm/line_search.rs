@@ -28,6 +28,8 @@ pub(super) struct FilterModel {
     pub current: FilterPair,
     /// The slope `∇φᵀ d`, in units of the objective.
     pub slope: f64,
+    /// The rounding error of a difference of barrier functions.
+    pub noise: f64,
     /// `θ_min`: the switching condition requires a violation of at most this.
     pub theta_min: f64,
     /// The largest acceptable violation of a step.
@@ -37,7 +39,8 @@ pub(super) struct FilterModel {
     pub delta_w: f64,
     /// Violations up to this one are rounding errors.
     pub rounding_violation: f64,
-    /// What full steps leave of equations, as a fraction of their values; zero without equations.
+    /// The residual that refinement leaves in equations, as a fraction of their values; zero
+    /// without equations.
     pub equation_residual: f64,
 }
 
@@ -64,8 +67,8 @@ impl FilterModel {
 
     /// Whether violation and barrier function change by rounding errors and by the residuals that
     /// refinement leaves in equations only: the step changes multipliers.
-    fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
-        let noise = noise + self.equation_residual * self.current.objective.abs();
+    fn changes_only_rounding(&self, trial_pair: &FilterPair) -> bool {
+        let noise = self.noise + self.equation_residual * self.current.objective.abs();
         self.current.violation <= self.rounding_violation
             && trial_pair.violation <= self.rounding_violation
             && (trial_pair.objective - self.current.objective).abs() <= noise
@@ -74,9 +77,8 @@ impl FilterModel {
     /// Whether the point at this step length is acceptable. Adds the iterate to the filter if the
     /// switching condition does not hold.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, trial_pair: &FilterPair) -> bool {
-        // The rounding error of a difference of barrier functions.
-        let noise = 10.0 * f64::EPSILON * self.current.objective.abs();
-        if self.changes_only_rounding(trial_pair, noise) {
+        let noise = self.noise;
+        if self.changes_only_rounding(trial_pair) {
             return true;
         }
         if !trial_pair.is_finite()

@@ -3,7 +3,10 @@
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
+
+/// IPOPT's `slack_move`, as an exponent of the unit roundoff.
+const SLACK_MOVE: f64 = 0.75;
 
 /// Options of [`Ipm`](super::Ipm). Symbols are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
@@ -24,7 +27,8 @@ pub struct IpmOptions {
     /// Stationarity is divided by `s_d`, complementarity by `s_c`:
     /// `max(1, mean |multiplier| / 100)` of all multipliers, and of those of bounds, in their units
     /// ([`scaling`](Self::scaling)). For units above 100 the tolerance is multiplied by a hundredth
-    /// of the unit, for units below one by the unit. Default 1e-8, in single precision 1e-3.
+    /// of the unit, for units below one by the unit. At the end of a run the unit of
+    /// complementarity is the magnitude of the objective. Default 1e-8, in single precision 1e-3.
     pub tolerance: f64,
     /// A run ends as acceptable after `acceptable_iterations` iterations with residuals up to this,
     /// or if it ends without progress or at the maximum number of iterations and the residuals of
@@ -44,7 +48,8 @@ pub struct IpmOptions {
     /// The update rule of the barrier parameter. Default [`Barrier::Adaptive`].
     pub barrier: Barrier,
     /// The distance of the initial point from its bounds, relative to their size and to the
-    /// distance between two bounds; at most 0.5. Default 1e-2.
+    /// distance between two bounds; at most 0.5. It is at least IPOPT's `slack_move`, `ε^(3/4)`:
+    /// 1.8e-12, in single precision 6.4e-6. Default 1e-2.
     pub bound_push: f64,
     /// Whether constants of the algorithm are multiples of units, computed at the start of a run.
     /// The unit of the objective `f` is
@@ -104,9 +109,18 @@ impl IpmOptions {
         }
     }
 
-    /// The tolerance, at least ten times the last barrier parameter, in units of the objective.
-    pub(super) fn barrier_tolerance(&self, objective_unit: f64) -> f64 {
-        (self.tolerance * tolerance_factor(objective_unit)).max(10.0 * self.final_mu) / objective_unit
+    /// The tolerance of products of slacks and multipliers in a unit of products, at least ten
+    /// times the last barrier parameter.
+    pub(super) fn product_tolerance(&self, product_unit: f64) -> f64 {
+        (self.tolerance * tolerance_factor(product_unit)).max(10.0 * self.final_mu)
+    }
+
+    /// The relative distance of the initial point from its bounds. Slacks below `slack_move`,
+    /// `ε^(3/4)`, are smaller than the rounding error of a step along their bound, and make every
+    /// step too short.
+    pub(super) fn push<T: Real>(&self, warm: bool) -> T {
+        let push = if warm { self.warm_push } else { self.bound_push };
+        T::from_f64(push.max(Scalar::powf(T::EPSILON, SLACK_MOVE)))
     }
 
     /// The first barrier parameter, scaled by the objective unit.

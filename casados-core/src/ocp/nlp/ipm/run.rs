@@ -120,9 +120,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         (ocp.step_length, ocp.algebraic_is_current) = (None, false);
         let is_stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if is_stuck
-            && (state.has_rescaled_objective || state.best_residual <= self.options.acceptable_tolerance)
-        {
+        if is_stuck && state.best_residual <= self.options.acceptable_tolerance {
             outcome.status = Status::Acceptable;
         }
         ocp.complete_outcome(&mut outcome);
@@ -148,7 +146,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             lengths.scaling = ocp.compute_units(work.units, work.scratch);
             capacity.scaling = lengths.scaling;
         }
-        let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
+        let push = self.options.push::<T>(self.options.warm_start);
         let (qp, iterate) = ocp.qp_and_iterate();
         self.trial_point.copy_from(iterate);
         push_inside_bounds(qp, lengths.has_fixed_initial_state, push, work.units, &mut iterate.view_mut());

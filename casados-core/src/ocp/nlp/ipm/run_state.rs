@@ -4,7 +4,9 @@ use super::IpmOptions;
 use super::barrier::{self, AdaptiveMu, Barrier};
 use super::kkt::dimensions::KktDimensions;
 use super::kkt::regularisation::Regularisation;
+use super::kkt::scaling::ScaledResiduals;
 use super::violations::RestorationPhase;
+use crate::ocp::assembly::units;
 use crate::ocp::nlp::filter::Filter;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
@@ -65,12 +67,16 @@ pub(in crate::ocp::nlp) struct RunState<'c> {
     pub has_reset_slacks: bool,
     /// Consecutive steps that are short, or in the restoration phase.
     pub stalled_iterations: usize,
+    /// The KKT error before the last step, if that was tiny.
+    tiny_step_error: Option<f64>,
     /// Whether slacks and multipliers belong to the present bounds, hard or soft.
     pub slacks_are_current: bool,
     /// Whether the QP is linearised at the iterate, with whatever multipliers.
     pub is_linearised: bool,
     /// Whether the filter has the `θ_max` of the present slacks.
     pub filter_is_initialised: bool,
+    /// The unit of products of slacks and multipliers.
+    pub product_unit: f64,
     /// The largest residual, relative to units and multipliers.
     pub nlp_error: f64,
     /// The largest residual of the best iterate.
@@ -79,8 +85,8 @@ pub(in crate::ocp::nlp) struct RunState<'c> {
     pub best_iteration: Iteration,
     /// The status `Infeasible` of contradictory bounds.
     pub contradictory_bounds: Option<Status>,
-    /// Whether the run converged with the objective unit of the guess, and continues with a smaller
-    /// one.
+    /// Whether the run converged with the units of the guess, and continues with those of the
+    /// iterate.
     pub has_rescaled_objective: bool,
     /// The size of variables above which the problem is tested for unboundedness.
     pub diverging_iterates_tol: f64,
@@ -120,9 +126,11 @@ impl<'c> RunState<'c> {
             complementarity_stall_iterations: 0,
             has_reset_slacks: false,
             stalled_iterations: 0,
+            tiny_step_error: None,
             slacks_are_current: false,
             is_linearised,
             filter_is_initialised: false,
+            product_unit: lengths.scaling.objective_unit,
             nlp_error: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
@@ -132,36 +140,57 @@ impl<'c> RunState<'c> {
         }
     }
 
+    /// Returns whether a tiny step follows another that left more than half of the KKT error: tiny
+    /// steps change multipliers alone, and can still reduce the complementarity.
+    pub fn count_tiny_step(&mut self, is_tiny: bool) -> bool {
+        let last_error = self.tiny_step_error.take();
+        self.tiny_step_error = is_tiny.then_some(self.nlp_error);
+        is_tiny && last_error.is_some_and(|last_error| self.nlp_error > 0.5 * last_error)
+    }
+
     /// Counts stalled steps: short ones, and steps of the restoration phase.
     pub fn count_stalled_step(&mut self, step: f64) {
         let stalls = self.restoration.outer_objective_unit.is_some() || step <= SHORT_STEP;
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
+    /// Updates the unit of products at an iterate: the objective unit, until the run would end.
+    pub fn update_product_unit(&mut self, objective: f64) {
+        let objective_unit = self.dimensions.scaling.objective_unit;
+        let is_final = self.has_rescaled_objective && !self.dimensions.in_restoration;
+        self.product_unit =
+            if is_final { units::product_unit(objective, objective_unit) } else { objective_unit };
+    }
+
     /// Updates the barrier parameter from the residuals; complementarity is divided by `products`.
     /// A new barrier parameter clears the filter.
-    pub fn update_mu<T: Real>(
+    pub(in crate::ocp::nlp::ipm) fn update_mu<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
-        (residuals, products): (&Residuals, f64),
+        ScaledResiduals {
+            barrier_residuals: (residuals, products),
+            error_without_complementarity,
+            ..
+        }: &ScaledResiduals,
         options: &IpmOptions,
     ) {
         let objective_unit = self.dimensions.scaling.objective_unit;
         let Inequalities { slack, multiplier, .. } = &iterate.inequalities;
+        // Residuals below the tolerance may be rounding errors, and do not delay smaller `μ`.
+        let left = if *error_without_complementarity <= options.tolerance {
+            Residuals::default()
+        } else {
+            *residuals
+        };
         let error = |mu| {
-            barrier::barrier_error(
-                residuals,
-                barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products,
-            )
+            let complementarity =
+                barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products;
+            barrier::barrier_error(&left, complementarity)
         };
         let mean_complementarity = barrier::mean_complementarity(&iterate.inequalities) / objective_unit;
+        let tolerance = options.product_tolerance(self.product_unit) / objective_unit;
         let mu = objective_unit
-            * self.adaptive_mu.update_mu(
-                self.mu / objective_unit,
-                error,
-                mean_complementarity,
-                options.barrier_tolerance(objective_unit),
-            );
+            * self.adaptive_mu.update_mu(self.mu / objective_unit, error, mean_complementarity, tolerance);
         if mu != self.mu {
             self.mu = mu;
             self.filter.clear();
@@ -171,9 +200,8 @@ impl<'c> RunState<'c> {
     /// Stores the error of an iterate, and counts iterations in which complementarity stalls: with
     /// the smallest `μ`, and all other residuals below the tolerance.
     pub fn update_nlp_error(&mut self, error: f64, error_without_complementarity: f64, options: &IpmOptions) {
-        let (objective_unit, tolerance) = (self.dimensions.scaling.objective_unit, options.tolerance);
-        let is_min_mu =
-            self.mu <= 2.0 * objective_unit * barrier::min_mu(options.barrier_tolerance(objective_unit));
+        let tolerance = options.tolerance;
+        let is_min_mu = self.mu <= 2.0 * barrier::min_mu(options.product_tolerance(self.product_unit));
         let is_stalled = error > tolerance.max(STALLED_COMPLEMENTARITY_RATIO * self.nlp_error);
         self.complementarity_stall_iterations =
             if is_min_mu && error_without_complementarity <= tolerance && is_stalled {

@@ -132,7 +132,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             && gradient_error > MAX_FIRST_GRADIENT_ERROR;
         let permitted_error =
             if is_inaccurate_start || state.full_qp_accuracy { 0.0 } else { relative_accuracy };
-        let rounding = if state.scaling.is_some() { ocp.gap_rounding_error() } else { 0.0 };
+        let is_scaled = state.scaling.is_some();
+        let rounding =
+            if is_scaled { ocp.gap_rounding_error().max(ocp.gradient_rounding_error()) } else { 0.0 };
         self.qp_solver.permit(permitted_error.max(QP_ROUNDING * largest_multiplier.to_f64()).max(rounding));
         // After an elastic step whose violations remain the QP with hard bounds is omitted. An
         // elastic solution without violations solves it.

@@ -39,6 +39,8 @@ const ATTEMPTS: [Attempt; 5] = [
     Attempt::Damped(MAX_ATTEMPT_DAMPING),
 ];
 const MAX_ATTEMPT_DAMPING: f64 = 1e2;
+/// IPOPT's `acceptable_tol` over its `tol`: the residual of an acceptable point, in tolerances.
+const ACCEPTABLE: f64 = 100.0;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem from its iterate. Afterwards the iterate is the best one, whatever the
@@ -140,7 +142,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.leave_elastic_mode(ocp, &mut state);
         let is_stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if is_stuck && state.has_rescaled_objective {
+        if is_stuck
+            && state.has_rescaled_objective
+            && state.best_residual <= ACCEPTABLE * self.options.tolerance
+        {
             outcome.status = Status::Acceptable;
         }
         // The verdict `Infeasible` holds at the last iterate.

@@ -9,7 +9,9 @@
 
 use super::Sqp;
 use super::run_state::RunState;
-use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ProblemScaling, ScalingUnits, tolerance_factor};
+use crate::ocp::assembly::units::{
+    NEAR_ONE_RATIO, ProblemScaling, ScalingUnits, product_unit, tolerance_factor,
+};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic_mode::{self, Worst};
@@ -161,15 +163,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             least = least.min(rounded);
         }
         let are_all_one = force == 1.0 && rows.iter().all(|&unit| unit == T::ONE);
-        state.scaling = (!are_all_one).then_some(ProblemScaling { objective_unit: force, tolerance: least });
+        state.scaling =
+            (!are_all_one).then_some(ProblemScaling { objective_unit: force, min_row_unit: least });
         if !are_all_one {
-            // Tolerances of scaled residuals are up to this factor smaller.
-            self.qp_solver.require(self.options.tolerance / NEAR_ONE_RATIO);
+            // Tolerances of scaled residuals are up to this factor smaller, since units are rounded
+            // to powers of two.
+            self.qp_solver.require(self.options.tolerance / (2.0 * NEAR_ONE_RATIO));
         }
     }
 
     /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
-    /// is far too large. Returns whether it has been replaced.
+    /// is far too large; from then on products of slacks and multipliers have a unit of their own.
+    /// Returns whether a unit has been replaced.
     pub(super) fn rescale_objective<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -184,10 +189,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let scratch = self.trial_point.view_mut().v;
         // QPs are solved to a hundredth of the tolerance.
         let least = self.options.tolerance / NEAR_ONE_RATIO;
-        let Some(smaller) = ocp.reduced_objective_unit(rows, sizes.objective_unit, least, scratch) else {
+        let smaller = ocp.reduced_objective_unit(rows, sizes.objective_unit, (least, false), scratch);
+        let products = product_unit(ocp.objective.to_f64(), sizes.objective_unit);
+        if smaller.is_none() && tolerance_factor(products) >= tolerance_factor(sizes.objective_unit) {
             return false;
-        };
-        sizes.objective_unit = floor_power_of_two::<T>(smaller);
+        }
+        sizes.objective_unit = smaller.map_or(sizes.objective_unit, floor_power_of_two::<T>);
         state.has_rescaled_objective = true;
         true
     }
@@ -236,6 +243,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let rounding = ocp.gap_rounding_error();
         for residual in [&mut scaled_residuals.dynamics, &mut scaled_residuals.inequalities] {
             *residual = if *residual <= rounding { 0.0 } else { *residual };
+        }
+        if state.has_rescaled_objective {
+            let force = units.scaling.objective_unit;
+            let products = product_unit(ocp.objective.to_f64(), force);
+            scaled_residuals.complementarity *= tolerance_factor(force) / tolerance_factor(products);
         }
         scale.direction = ScalingDirection::Unscale;
         scale.scale_qp(&mut ocp.qp);

@@ -8,6 +8,8 @@
 //! differential algebraic equations", GAMM-Mitteilungen 30 (2007); J. Nocedal, S. J. Wright,
 //! *Numerical Optimization*, 2nd edition, sections 10.3 and 16.2 (null-space methods).
 
+mod table;
+
 use super::get;
 use super::unknowns::Unknowns;
 use crate::linalg::{axpy, dot};
@@ -26,7 +28,8 @@ use core::fmt;
 /// The covariance of states and controls of an estimate; see
 /// [`Ocp::covariance`](crate::ocp::Ocp::covariance).
 ///
-/// Estimated parameters are [free](crate::ocp::HeapOcp), equal at all stages.
+/// Estimated parameters are [free](crate::ocp::HeapOcp), equal at all stages. `Display` writes a
+/// table of estimates with their standard deviations.
 ///
 /// ```
 /// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -46,6 +49,7 @@ use core::fmt;
 /// // The mean of four samples.
 /// let deviation = covariance.standard_deviation("x[0]", 0)?;
 /// assert!((deviation - 0.05).abs() < 1e-12 && !covariance.is_identifiable());
+/// println!("{covariance}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -58,6 +62,8 @@ pub struct Covariance<T> {
     /// Rows of `Z (Zᵀ H Z)^(−½)` for states and controls, by stages.
     rows: Vec<T>,
     identifiable_count: usize,
+    /// The estimate, in the same order.
+    values: Vec<T>,
     /// Whether a variable changes along an unidentifiable direction.
     is_unidentifiable: Vec<bool>,
     directions: Vec<Unidentifiable<T>>,
@@ -285,7 +291,11 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let covariance =
             unknowns.covariance::<P>(&basis, &unidentifiable_directions, &units, rounding.sqrt())?;
         let free = (0..self.layout().free_count).map(|w| self.free_parameter_name(w)).collect();
-        Ok(Covariance { free, ..covariance })
+        let mut values = zeros((intervals + 1) * (nx + nu))?;
+        for (row, stage) in values.chunks_exact_mut((nx + nu).max(1)).zip(self.iterate.stages()) {
+            row.iter_mut().zip(stage.x.iter().chain(stage.u)).for_each(|(to, &value)| *to = value);
+        }
+        Ok(Covariance { free, values, ..covariance })
     }
 }
 
@@ -333,6 +343,7 @@ impl<T: Real> Unknowns<T> {
             dims: self.dims,
             rows,
             identifiable_count: basis.len(),
+            values: Vec::new(),
             is_unidentifiable: unknown,
             directions: directions.collect(),
             variance_factor: T::ONE,

@@ -47,20 +47,23 @@ pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     FilterPair { objective: (objective + penalties + mu * barrier) / force, violation }
 }
 
-/// Returns the slope `∇φᵀ d`.
+/// Returns the slope `∇φᵀ d`, and `Σ |∂f/∂v_i| |v_i|`, of which the rounding errors of the point
+/// are a part.
 pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
     iterate: &Iterate<'_, T>,
     mu: f64,
     scratch: &mut [T],
-) -> f64 {
-    let mut slope = T::ZERO;
+) -> (f64, f64) {
+    let (mut slope, mut terms) = (T::ZERO, T::ZERO);
     for (place, stage) in StageOffsetsIter::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
         let view = stage.arrays();
         let gradient = part_mut(scratch, 0, place.ld);
         copy_common(gradient, part(view.gradient, 0, place.ld));
         add_symmetric(gradient, view.hessian, place.ld, part(iterate.v, place.row, place.ld), place.n);
-        let step = part(iterate.step, place.row, place.n);
-        slope = gradient.iter().zip(step).fold(slope, |sum, (&g, &d)| sum + g * d);
+        let (step, v) = (part(iterate.step, place.row, place.n), part(iterate.v, place.row, place.n));
+        for ((&g, &d), &v) in gradient.iter().zip(step).zip(v) {
+            (slope, terms) = (slope + g * d, terms + (g * v).abs());
+        }
     }
     let inequalities = &iterate.inequalities;
     let mut slope = slope.to_f64();
@@ -74,7 +77,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
     {
         slope += (l.to_f64() + q.to_f64() * e.to_f64()) * d.to_f64();
     }
-    slope
+    (slope, terms.to_f64())
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {

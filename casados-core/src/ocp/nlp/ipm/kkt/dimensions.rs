@@ -31,7 +31,7 @@ impl KktDimensions {
             has_fixed_initial_state: reading.fixed,
             number_count: numbers,
             extent,
-            scaling: ProblemScaling { objective_unit: 1.0, tolerance: 1.0 },
+            scaling: ProblemScaling { objective_unit: 1.0, min_row_unit: 1.0 },
             in_restoration: false,
         }
     }

@@ -12,11 +12,10 @@ use crate::scalar::Real;
 pub(in crate::ocp::nlp::ipm) fn push_inside_bounds<T: Real>(
     qp: QpView<'_, T>,
     fixed: bool,
-    push: f64,
+    push: T,
     units: &[T],
     solution: &mut SolutionView<'_, T>,
 ) {
-    let push = T::from_f64(push);
     for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
         let v = part_mut(solution.v, place.v, place.n);
         let (x, u) = v.split_at_mut_checked(place.nx).unwrap_or_default();
@@ -60,7 +59,7 @@ pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
     solution: &SolutionView<'_, T>,
 ) {
     let ([force, mu], units) = ([units.scaling.objective_unit, mu].map(T::from_f64), units.rows);
-    let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
+    let push = options.push::<T>(warm);
     let inequalities = &mut iterate.inequalities;
     let count = inequalities.counts.sides();
     // Variables are inside their hard bounds, and their slacks are exact. Other slacks are pushed.

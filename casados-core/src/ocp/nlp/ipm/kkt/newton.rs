@@ -27,7 +27,7 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     let first =
         if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
     let mut inequalities = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
-    let ProblemScaling { objective_unit: force, tolerance: least } = lengths.scaling;
+    let ProblemScaling { objective_unit: force, min_row_unit: least } = lengths.scaling;
     inequalities.dual_regularisation = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
     iterate.inequalities.equation_multiplier_steps = take_mut(&mut numbers, lengths.counts.equations);
@@ -48,7 +48,7 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
     iterate.inequalities.list(qp, &reading_options(qp));
-    let (equations, least) = (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.tolerance));
+    let (equations, least) = (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.min_row_unit));
     for (stiffness, &row) in iterate.inequalities.stiffness_scale.iter_mut().zip(equations) {
         let ratio = least / at(units, row);
         *stiffness = ratio * ratio;

@@ -49,12 +49,13 @@ pub(in crate::ocp::nlp::ipm) struct ScaledResiduals {
 }
 
 /// Scales residuals by units, and by the means of large multipliers: `s_d` for all multipliers,
-/// `s_c` for those of inequalities.
+/// `s_c` for those of inequalities. Complementarity is compared with tolerances in units of
+/// `product_unit`.
 pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
     pi: &[T],
-    units: ScalingUnits<'_, T>,
+    (units, product_unit): (ScalingUnits<'_, T>, f64),
     stage_residual: f64,
 ) -> ScaledResiduals {
     let (force, units) = (units.scaling.objective_unit, units.rows);
@@ -77,10 +78,10 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
         .fold((inequality_multiplier_sum + equation_multiplier_sum, 0), |(sum, count), pair| {
             (size(sum, pair), count + 1)
         });
-    let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / S_MAX).max(1.0);
+    let mean = |sum: f64, count: usize, unit: f64| (sum / unit / count.max(1) as f64 / S_MAX).max(1.0);
     let pairs = inequalities.counts.pair_count();
-    let (s_d, s_c) =
-        (mean(all, count + pairs + inequalities.counts.equations), mean(inequality_multiplier_sum, pairs));
+    let s_d = mean(all, count + pairs + inequalities.counts.equations, force);
+    let [s_c, tolerance_s_c] = [force, product_unit].map(|unit| mean(inequality_multiplier_sum, pairs, unit));
     let (mut barrier_stationarity, mut tolerance_stationarity, wide) =
         (T::ZERO, T::ZERO, T::from_f64(NEAR_ONE_RATIO));
     for (&g, &unit) in iterate.stationarity.iter().zip(units) {
@@ -98,7 +99,7 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     let tolerance_residuals = Residuals {
         stationarity: tolerance_stationarity.to_f64() / (objective_tolerance_unit * s_d),
         inequalities: largest_scaled_inequality(inequalities, units, tolerance_factor),
-        complementarity: residuals.complementarity / (objective_tolerance_unit * s_c),
+        complementarity: residuals.complementarity / (tolerance_factor(product_unit) * tolerance_s_c),
         ..barrier
     };
     let others = Residuals { complementarity: 0.0, ..tolerance_residuals }.largest();

@@ -2,6 +2,7 @@
 
 use super::elastic_mode;
 use super::phase;
+use crate::ocp::assembly::units::{product_unit, tolerance_factor};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
@@ -57,7 +58,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
 impl RunState<'_> {
     /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
-    /// is far too large. Returns whether it has been replaced.
+    /// is far too large; from then on products of slacks and multipliers have a unit of their own.
+    /// Returns whether a unit has been replaced.
     fn rescale_objective<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -68,9 +70,12 @@ impl RunState<'_> {
             return false;
         }
         let force = self.dimensions.scaling.objective_unit;
-        let Some(smaller) = ocp.reduced_objective_unit(work.units, force, tolerance, work.scratch) else {
+        let smaller = ocp.reduced_objective_unit(work.units, force, (tolerance, true), work.scratch);
+        let products = product_unit(ocp.objective.to_f64(), force);
+        if smaller.is_none() && tolerance_factor(products) >= tolerance_factor(force) {
             return false;
-        };
+        }
+        let smaller = smaller.unwrap_or(force);
         self.has_rescaled_objective = true;
         (self.dimensions.scaling.objective_unit, self.max_dimensions.scaling.objective_unit) =
             (smaller, smaller);
