@@ -397,7 +397,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
             if is_identity { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
             let end = PanelCombination {
-                base: base,
+                base,
                 unit_rows: ones,
                 dy,
                 unknowns: 0..nx,
