@@ -20,14 +20,18 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
 ) -> Result<Iterate<'a, T>, QpError> {
-    let mut numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
-    let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
+    let numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
+    // Those of sides are of any length: behind the others, all of which are whole registers.
+    let counts = lengths.counts;
+    let others = lengths.numbers.saturating_sub(counts.numbers() + counts.equations);
+    let (mut numbers, mut of_sides) = numbers.split_at_mut_checked(others).unwrap_or_default();
+    let mut indices = indices.at_least(counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
-    let mut sides = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
+    let mut sides = Inequalities::new(counts, &mut of_sides, &mut indices);
     let Sizes { force, least } = lengths.sizes;
     sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, sides, &mut numbers);
-    iterate.sides.free_step = take_mut(&mut numbers, lengths.counts.equations);
+    iterate.sides.free_step = take_mut(&mut of_sides, counts.equations);
     Ok(iterate)
 }
 
