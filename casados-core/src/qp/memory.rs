@@ -3,6 +3,9 @@
 use super::error::QpError;
 use alloc::vec::Vec;
 
+/// Bytes of a cache line, which are those of the widest register.
+pub const CACHE_LINE: usize = 64;
+
 /// As many defaults.
 pub fn zeros<T: Copy + Default>(length: usize) -> Result<Vec<T>, QpError> {
     let mut memory = Vec::new();

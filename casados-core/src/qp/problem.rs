@@ -2,6 +2,8 @@
 
 use super::error::{QpError, QpField};
 use super::layout::{Places, StageDims, copy_common, end, exceeds_memory, part, part_mut, take_mut};
+#[cfg(feature = "alloc")]
+use super::memory::CACHE_LINE;
 use super::stage::{ConstraintVector, Stage, StageMut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -41,6 +43,9 @@ pub struct Qp<T, D, M> {
     /// How many numbers the stages take; behind them is a mark for every state and control of the
     /// first one.
     stages: usize,
+    /// Where a cache line begins: whole registers are read from there on.
+    #[cfg(feature = "alloc")]
+    begin: usize,
     number: PhantomData<T>,
 }
 
@@ -111,7 +116,13 @@ impl<T: Real> HeapQp<T> {
     /// # Errors
     /// [`QpError::OutOfMemory`]; [`QpError::Dimension`] if there is no stage.
     pub fn new(dims: &[StageDims]) -> Result<Self, QpError> {
-        Self::in_memory(super::memory::copy(dims)?, super::memory::zeros(Self::memory(dims))?)
+        let line = CACHE_LINE / size_of::<T>();
+        let memory: Vec<T> = super::memory::zeros(Self::memory(dims).saturating_add(line))?;
+        let begin = memory.as_ptr().align_offset(CACHE_LINE).min(line);
+        let mut qp = Self::in_memory(super::memory::copy(dims)?, memory)?;
+        qp.begin = begin;
+        qp.clear();
+        Ok(qp)
     }
 }
 
@@ -137,24 +148,42 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
             return Err(QpError::Dimension { field: QpField::Data, stage: 0, expected, found });
         }
         let stages = end::<T>(dims.as_ref()).data;
-        let mut qp = Self { dims, memory, stages, number: PhantomData };
+        let mut qp = Self {
+            dims,
+            memory,
+            stages,
+            #[cfg(feature = "alloc")]
+            begin: 0,
+            number: PhantomData,
+        };
         qp.clear();
         Ok(qp)
     }
     /// All zero, without bounds.
     pub fn clear(&mut self) {
-        let Self { dims, memory, .. } = self;
-        clear(dims.as_ref(), memory.as_mut());
+        let (dims, data) = self.parts_mut();
+        clear(dims, data);
+    }
+    /// Dimensions and numbers.
+    fn parts_mut(&mut self) -> (&[StageDims], &mut [T]) {
+        let data = self.memory.as_mut();
+        #[cfg(feature = "alloc")]
+        let data = data.get_mut(self.begin..).unwrap_or_default();
+        (self.dims.as_ref(), data)
     }
     /// For solvers.
     #[must_use]
     pub fn view(&self) -> QpView<'_, T> {
         let (dims, data) = (self.dims.as_ref(), self.memory.as_ref());
+        #[cfg(feature = "alloc")]
+        let data = data.get(self.begin..).unwrap_or_default();
         QpView { dims, data, marks: part(data, self.stages, coupling_mark_count(dims)) }
     }
     /// Periodic states and shared controls.
     pub(super) fn marks_mut(&mut self) -> &mut [T] {
-        part_mut(self.memory.as_mut(), self.stages, coupling_mark_count(self.dims.as_ref()))
+        let stages = self.stages;
+        let (dims, data) = self.parts_mut();
+        part_mut(data, stages, coupling_mark_count(dims))
     }
     /// The dimensions of the stages.
     #[must_use]
@@ -163,17 +192,19 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     }
     /// A stage, to be written.
     pub fn stage_mut(&mut self, stage: usize) -> Option<StageMut<'_, T>> {
-        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
-        Some(StageMut { place, data: part_mut(self.memory.as_mut(), place.data, place.data_len()) })
+        let (dims, data) = self.parts_mut();
+        let place = Places::<T>::new(dims).nth(stage)?;
+        Some(StageMut { place, data: part_mut(data, place.data, place.data_len()) })
     }
     /// All stages, in order, to be written.
     pub fn stages_mut(&mut self) -> impl Iterator<Item = StageMut<'_, T>> {
-        stages_mut(self.dims.as_ref(), self.memory.as_mut())
+        let (dims, data) = self.parts_mut();
+        stages_mut(dims, data)
     }
     /// All numbers.
     #[cfg(feature = "alloc")]
     pub(super) fn data_mut(&mut self) -> &mut [T] {
-        self.memory.as_mut()
+        self.parts_mut().1
     }
     /// `x₀`, by two equal bounds of every component, which are hard.
     ///

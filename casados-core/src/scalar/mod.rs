@@ -265,6 +265,8 @@ pub trait Packed<T>: Lanes {
     fn minus_product(self, a: Self, b: Self) -> Self;
     /// The sum of the lanes.
     fn total(self) -> T;
+    /// The sum of the lanes of each register, in a lane of its own. There are as many as lanes.
+    fn totals(all: &[Self]) -> Self;
     /// The largest lane; any of them if one is NaN.
     fn largest(self) -> T;
 }
@@ -274,6 +276,10 @@ pub trait Packed<T>: Lanes {
 pub trait Registers<T> {
     /// To be `#[inline(always)]`, with everything that it calls.
     fn run<E: Packed<T>>(self);
+    /// So many lanes are of use: in a register of twice as many half of them would be padding.
+    fn lanes(&self) -> usize {
+        usize::MAX
+    }
 }
 
 /// A computation that can be made with any register of numbers of type `T`.

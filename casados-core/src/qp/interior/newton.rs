@@ -88,6 +88,12 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.evaluate_sides(self.step, |value, _| value, |value, _| -value);
     }
 
+    /// The distances from the bounds, into `scratch`.
+    #[inline(always)]
+    pub fn evaluate_distances(&mut self) {
+        self.sides.evaluate_sides(self.v, |value, bound| value - bound, |value, bound| bound - value);
+    }
+
     /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals
     /// stay as they were.
     pub fn go(&mut self, primal: T, dual: T) {

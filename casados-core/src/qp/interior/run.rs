@@ -45,6 +45,8 @@ pub struct Run<'r, 'a, 's, T> {
     /// Whether the time is over.
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
+    /// The most variables of a stage.
+    pub variables: usize,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<QpStatistics, QpError>,
     /// Whether the multipliers prove that no point satisfies all constraints; of the problem as it
@@ -58,9 +60,13 @@ compiled! {
 }
 
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
+    // In wider ones what is padding would be computed, too.
+    fn lanes(&self) -> usize {
+        self.variables
+    }
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible } = self;
+        let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible, .. } = self;
         let warm = [&*solution.v, solution.lower, solution.upper];
         if attempt.start == QpStart::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
             attempt.start = QpStart::Cold;

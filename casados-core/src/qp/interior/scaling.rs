@@ -143,10 +143,11 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
         }
         // A state that costs nothing anywhere is as large as what leads to it.
         let dynamics = part(qp.data, place.data, place.next * place.ld);
-        for (root_of_state, column) in next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1))) {
+        let states = next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1)));
+        for (root_of_state, column) in states.filter(|(root, _)| **root == T::ZERO) {
             let terms = column.iter().zip(&*variables);
             let reach = terms.fold(T::ZERO, |most, (a, &unit)| (a.abs() * unit).max(most));
-            if *root_of_state == T::ZERO && reach > T::ZERO {
+            if reach > T::ZERO {
                 *root_of_state = root / reach;
             }
         }
@@ -165,8 +166,10 @@ fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [
             let room = limits.bound_range();
             rooms.add(root * room);
             gains.add(root * limits.distance());
-            let is_bounded = slope > root * root * room;
-            gains.add(if is_bounded { (slope * room).sqrt() } else { slope / root });
+            if slope != T::ZERO {
+                let is_bounded = slope > root * root * room;
+                gains.add(if is_bounded { (slope * room).sqrt() } else { slope / root });
+            }
         }
     }
     // Where there is little to gain, at a point of rest, it is what the least room costs, but for

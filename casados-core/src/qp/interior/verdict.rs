@@ -46,11 +46,19 @@ impl<T: Real> Iterate<'_, T> {
         for &side in &*sides.soft {
             set(sides.multiplier, side as usize, T::ZERO);
         }
-        let objective = core::mem::replace(&mut self.objective, false);
+        // Weights are those of the next step, which is still to come: until then the gradient with
+        // the objective is kept in their place. Of the dynamics and of bounds residuals are known.
+        copy_common(self.weights, self.stationarity);
+        let (objective, terms, own_terms) = (self.objective, self.terms, self.own_terms);
+        self.objective = false;
+        self.evaluate_gradient::<E>(multipliers);
+        self.evaluate_distances();
         let suspicious = self.is_certificate::<E>(T::from_f64(SUSPICION_FACTOR), multipliers);
-        self.objective = objective;
+        (self.objective, self.terms, self.own_terms) = (objective, terms, own_terms);
+        copy_common(self.stationarity, self.weights);
         copy_common(self.sides.multiplier, self.sides.multiplier_step);
-        if !suspicious {
+        if !suspicious && self.coupling.is_some() {
+            // Multipliers of couplings are what the gradient without the objective has left.
             let _ = self.evaluate::<E>(multipliers);
         }
         suspicious
@@ -74,17 +82,17 @@ impl<T: Real> Iterate<'_, T> {
     /// where numbers are 1e5 times (of single precision a hundred times) as large as here.
     #[inline(always)]
     pub fn proves_infeasibility<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
+        let _ = self.evaluate::<E>(multipliers);
         self.is_certificate::<E>(
             T::from_f64(if T::EPSILON < DOUBLE_PRECISION_EPSILON { 1e5 } else { 1e2 }),
             multipliers,
         )
     }
 
-    /// The same, where numbers may be `far` times as large.
+    /// The same of an iterate that was evaluated, where numbers may be `far` times as large.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline(never))]
-    fn is_certificate<E: Packed<T>>(&mut self, far: T, multipliers: &mut [T]) -> bool {
-        let _ = self.evaluate::<E>(multipliers);
+    fn is_certificate<E: Packed<T>>(&self, far: T, multipliers: &[T]) -> bool {
         let count = self.sides.counts.sides();
         let (forces, distances) = (part(self.sides.multiplier, 0, count), part(self.sides.scratch, 0, count));
         let mut lagrangian = dot::<T, E>(multipliers, self.dynamics)

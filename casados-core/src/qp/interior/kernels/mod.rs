@@ -4,13 +4,13 @@
 //! inlined into the function that was compiled for `E`. Firmware has the machine that it was
 //! compiled for, and one copy of each kernel: flash is dearer than calls.
 
+mod dots;
 mod product;
 mod vectors;
 
-pub use product::{PADDING_COLUMNS, Part, Source, product, subtract};
-pub use vectors::{
-    add, add_symmetric, add_transposed, copy, copy_negative, mirror, scale, subtract_column, symmetric,
-};
+pub use dots::{add_feedback, add_transposed, lanes, sum_transposed, symmetric};
+pub use product::{PADDING_COLUMNS, Part, Source, difference, product, subtract};
+pub use vectors::{add_rows, add_symmetric, copy, mirror, scale, subtract_column, subtract_from};
 
 use crate::scalar::{Packed, Real};
 
@@ -36,10 +36,36 @@ impl<'a, T> Columns<'a, T> {
     }
 }
 
+/// Neighbours in a slice. Checks of each would take as long as the product of a small tile: a third
+/// of its instructions.
+///
+/// # Safety
+/// There are `N` elements from the index on.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub unsafe fn chunk<T, const N: usize>(slice: &[T], index: usize) -> &[T; N] {
+    debug_assert!(index + N <= slice.len());
+    // SAFETY: an array is its elements one behind the other, and the caller says that they exist.
+    unsafe { &*slice.as_ptr().add(index).cast() }
+}
+
 /// A number in every lane.
 #[inline(always)]
 pub fn splat<T: Real, E: Packed<T>>(value: T) -> E {
     E::from_f64(value.to_f64())
+}
+
+/// The most lanes of registers that computations on slices are made in.
+const MAX_LANES: usize = 8;
+
+/// `0, 1, 2, …` in the lanes of a register.
+#[inline(always)]
+fn lane_indices<T: Real, E: Packed<T>>() -> E {
+    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
+    for lane in 0..E::LANES {
+        E::set_lane(&mut index, lane, lane as f64);
+    }
+    E::load(&index)
 }
 
 /// What tests of products share.
