@@ -1,8 +1,8 @@
 #![doc = include_str!("guide/links.md")]
 #![doc = include_str!("../docs/guide/README.md")]
 
-/// Pages of `docs/`. Links between them and pictures are defined where they stand; the definitions
-/// of this documentation come first, and hold.
+/// The pages of `docs/`. Markdown uses the first definition of a link: the definitions here replace
+/// those at the end of a page, which are relative to the repository.
 macro_rules! chapters {
     ($($name:ident $file:literal)*) => { $(
         #[doc = include_str!("guide/links.md")]

@@ -5,7 +5,7 @@
 //! # The guide
 //!
 //! [`guide`] has chapters with programs that run, from a first model to firmware;
-//! [`guide::language`] says what a model may contain.
+//! [`guide::language`] describes what a model may contain.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -31,10 +31,10 @@ pub use casados_macros::{Record, dae, function, ode};
 #[doc(hidden)]
 pub use casados_core::__private;
 
-/// What most programs need: `use casados::prelude::*;`
+/// The names that most programs need: `use casados::prelude::*;`
 ///
-/// It stands beside the globs of [`ocp`], [`qp`] and nalgebra: no name is in two of them. A program
-/// that does not depend on nalgebra itself takes it from here, with its macros:
+/// Its names do not collide with those of [`ocp`], [`qp`] and nalgebra. A program that does not
+/// depend on nalgebra imports it from here, with its macros:
 ///
 /// ```
 /// use casados::nalgebra::{self, vector};
@@ -70,7 +70,7 @@ pub mod prelude {
     };
 }
 
-/// Choices of [`Options`].
+/// Types of the fields of [`Options`].
 ///
 /// ```
 /// use casados::options::{Newton, Start};
@@ -91,7 +91,7 @@ pub mod options {
     pub use casados_core::options::{Jacobian, Newton, Start};
 }
 
-/// What an [`Error`] tells: which argument, where, and why.
+/// The contents of an [`Error`]: the argument, the place and the cause.
 ///
 /// ```
 /// use casados::error::Argument;
@@ -113,10 +113,10 @@ pub mod error {
     pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started, Unsettled};
 }
 
-/// Vectors and matrices of a model, and what is known about it before it runs.
+/// Vectors and matrices of a model, and its properties that are known at compile time.
 ///
-/// With the dimensions of a model `M` that is generic, its initial state is a `VectorX<M, f64>`;
-/// of a known model it is an `SVector<f64, NX>` of [`nalgebra`].
+/// The initial state of a generic model `M` is a `VectorX<M, f64>`; of a concrete model it is an
+/// `SVector<f64, NX>` of [`nalgebra`].
 ///
 /// ```
 /// use casados::model::{VectorU, VectorX};
@@ -154,17 +154,17 @@ pub mod function {
     };
 }
 
-/// Implicit methods: what [`Irk`] stands for.
+/// Implicit methods: the type behind [`Irk`].
 pub mod irk {
     pub use casados_core::irk::{Implicit, Integrator};
 }
 
-/// Explicit methods: what [`Erk`] stands for.
+/// Explicit methods: the type behind [`Erk`].
 pub mod erk {
     pub use casados_core::erk::{Explicit, Integrator};
 }
 
-/// Many intervals at once: what [`Batch`] stands for.
+/// Integration of many intervals in one call: the type behind [`Batch`].
 ///
 /// ```
 /// use casados::prelude::*;
@@ -189,7 +189,7 @@ pub mod batch {
     pub use casados_core::batch::{Batched, Integrator, Single, Slice, Standard};
 }
 
-/// Steps of variable size: what [`Adaptive`] stands for, and the results of [`Piecewise`] and
+/// Adaptive step sizes: the type behind [`Adaptive`], and the results of [`Piecewise`] and
 /// [`Hybrid`].
 #[cfg(feature = "alloc")]
 pub mod adaptive {
@@ -200,13 +200,13 @@ pub mod adaptive {
     };
 }
 
-/// Integrands beside an integrator.
+/// Integrals along a solution, computed by an integrator.
 pub mod integrator {
     pub use casados_core::integrator::With;
     pub use casados_core::quadrature::Integrand;
 }
 
-/// What memory of an integrator is for, in bounds: `W: Memory + WithForward`.
+/// Capabilities of an integrator's memory, for trait bounds: `W: Memory + WithForward`.
 pub mod memory {
     #[cfg(feature = "alloc")]
     pub use casados_core::memory::Shared;
@@ -216,20 +216,20 @@ pub mod memory {
     };
 }
 
-/// Elementary functions of `f64` and `f32` as methods, where there is no `std`.
+/// Elementary functions of `f64` and `f32` as methods, for targets without `std`.
 ///
-/// A model has them in scope. Helper functions outside of it take
+/// Models import them implicitly. Helper functions outside of a model need
 /// `use casados::scalar::Float as _;`.
 pub mod scalar {
     pub use casados_core::scalar::Float;
 }
 
-/// Models over num-dual, for Rust that the attributes cannot read.
+/// Models over num-dual, for Rust code that the attributes cannot read.
 #[cfg(feature = "num-dual")]
 pub mod dual {
     pub use casados_core::dual::{DualModel, DualNum, DualNumCopy};
 }
 
-// Of the documentation only, whose examples are run.
+// Compiled for the documentation only; its examples are tests.
 #[cfg(any(doc, doctest))]
 pub mod guide;

@@ -1,4 +1,4 @@
-//! Every way in which a run can end without a result.
+//! Errors of all calls.
 
 mod display;
 mod place;
@@ -7,9 +7,9 @@ pub use place::{Argument, Place, Quantity};
 
 use crate::tableau::TableauError;
 
-/// Why there is no result: what, where, and the values that say so.
+/// The reason why there is no result, with its place and values.
 ///
-/// After an error the integrator is usable, and its warm start is as it was before the call.
+/// After an error the integrator is usable, and its warm start is as before the call.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -31,246 +31,249 @@ use crate::tableau::TableauError;
 #[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// An option has a value that makes no sense.
+    /// An option has an invalid value.
     InvalidOption {
-        /// The option.
+        /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// Value of the option.
         value: f64,
-        /// What is wrong with it.
+        /// The rule that it violates.
         reason: &'static str,
     },
-    /// A tableau makes no sense.
+    /// A tableau is invalid.
     Tableau(TableauError),
-    /// The tableau that was given to an explicit integrator is implicit.
+    /// An implicit tableau was given to an explicit integrator.
     NotExplicit {
-        /// The stage that needs itself or a later one.
+        /// The stage that depends on itself or a later one.
         stage: usize,
     },
     /// An argument of a call has an element that is infinite or NaN.
     NonFiniteInput {
         /// The argument.
         argument: Argument,
-        /// The element; of matrices in column-major order.
+        /// Index of the element; in column-major order for matrices.
         index: usize,
-        /// What the model calls it; empty of times and lengths.
+        /// Name of the element in the model; empty for times and lengths.
         name: &'static str,
-        /// Its value.
+        /// Value of the element.
         value: f64,
     },
-    /// The model has parameters, and they were never set.
+    /// The model has parameters that were never set.
     ParametersNotSet,
-    /// Start values were asked for with `Start::Given`, and they were never given.
+    /// `Start::Given` is set, but start values were never given.
     StartNotGiven,
     /// The model returned an infinite value or NaN.
     NonFiniteModel {
-        /// What was evaluated.
+        /// The quantity that was evaluated.
         quantity: Quantity,
         /// The equation, the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// Where.
+        /// Place of the evaluation.
         at: Place,
     },
-    /// The model has no finite value where Newton's method starts, or where it leads from there,
+    /// The model has no finite value at the start values of Newton's method, or at a later iterate,
     /// because of the value of an algebraic state.
     NonFiniteStart {
-        /// What was evaluated.
+        /// The quantity that was evaluated.
         quantity: Quantity,
         /// The equation, the row of the residual.
         equation: usize,
         /// The value.
         value: f64,
-        /// The algebraic state with another value of which the equation has one, and where it
-        /// started.
+        /// The algebraic state that causes it (the equation has a finite value at another value of
+        /// the state), and its start value.
         started: Started,
-        /// Where.
+        /// Place of the evaluation.
         at: Place,
     },
     /// The Newton matrix is singular to rounding: with this step size the equations do not
     /// determine the unknowns.
     Singular {
-        /// The unknown whose column depends on those of the unknowns before it: the state whose
-        /// derivative it is, or the algebraic state.
+        /// The unknown whose column depends linearly on the preceding ones: an algebraic state, or
+        /// the state of a derivative.
         unknown: &'static str,
-        /// Where.
+        /// Place of the matrix.
         at: Place,
     },
-    /// The planned elimination was not good enough here, or Newton's method did not converge with
-    /// it, and the memory of the integrator has no place to pivot the whole matrix:
-    /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also of a model without a plan.
+    /// The planned elimination was too inaccurate, or Newton's method did not converge with it, and
+    /// the integrator has no dense fallback:
+    /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also for a model without a plan.
     NotPivoted {
-        /// The step.
+        /// Index of the step.
         step: usize,
     },
     /// Newton's method did not converge.
     NotConverged {
-        /// The residual of an equation relative to the magnitude of its terms, the largest.
+        /// The largest residual of an equation, relative to the magnitude of its terms.
         residual: f64,
-        /// The equation that has it.
+        /// The equation with this residual.
         equation: usize,
         /// The unknown with the largest last increment relative to its size.
         unknown: &'static str,
-        /// This increment.
+        /// The increment of this unknown.
         increment: f64,
-        /// Where it ended.
+        /// Place of the last iteration.
         at: Place,
-        /// An algebraic state of these, and its start value; if there is one, and the start was no
-        /// continuation of a solution.
+        /// This unknown if it is an algebraic state, or an algebraic state of the equation, with
+        /// its start value; `None` if there is none, or if the iteration started from a solution.
         started: Option<Started>,
     },
-    /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
-    /// start values of that step and where the iteration led to: the algebraic equations may have
-    /// lost their solution at a fold.
+    /// Newton's method did not converge in a later step, and `∂f/∂(ẋ, z)` becomes singular between
+    /// the initial guess of that step and the last iterate: the solution of the algebraic equations
+    /// may end at a fold.
     SingularAlgebraic {
-        /// The algebraic state along which it does.
+        /// The algebraic state along which the matrix becomes singular.
         unknown: &'static str,
-        /// Where the iteration ended.
+        /// Place of the last iteration.
         at: Place,
     },
-    /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
-    /// integration starts, or Newton's method does not find them from the values of `set_start`.
+    /// No consistent `ẋ` and `z` exist for the initial `x` of an adaptive integration, or Newton's
+    /// method does not find them from the values of `set_start`.
     InconsistentStart {
         /// The time.
         t: f64,
-        /// The equation that is violated most.
+        /// The equation with the largest violation.
         equation: usize,
-        /// By how much: its residual where Newton's method ended.
+        /// Residual of this equation at the last iterate.
         residual: f64,
-        /// The unknown that the equations do not determine, or else the one that moved most: the
-        /// state whose derivative it is, or the algebraic state.
+        /// The unknown that the equations do not determine, otherwise the one with the largest
+        /// change: an algebraic state, or the state of a derivative.
         unknown: &'static str,
-        /// Its value where Newton's method ended.
+        /// Value of the unknown at the last iterate.
         value: f64,
-        /// Whether the equations do not determine it.
+        /// Whether the equations do not determine the unknown.
         singular: bool,
     },
-    /// An unknown of the stages, or a result, is beyond the range of the number type.
+    /// An unknown of the stages or a result exceeds the range of the number type.
     Overflow {
-        /// The step.
+        /// Index of the step.
         step: usize,
-        /// The unknown `(ẋ, z)`, or the element of the result in column-major order.
+        /// Index of the unknown `(ẋ, z)`, or of the element of the result in column-major order.
         index: usize,
     },
-    /// A function that is integrated along has a value that is not finite.
+    /// An integrand, event function or jump has a value that is not finite.
     NonFiniteFunction {
-        /// Its name.
+        /// Name of the function.
         function: &'static str,
-        /// Which of its outputs.
+        /// Index of the output.
         output: usize,
         /// The value.
         value: f64,
-        /// Where.
+        /// Place of the evaluation.
         at: Place,
     },
-    /// No step size was short enough: an adaptive integrator cannot get beyond this time.
+    /// The step size underflows: an adaptive integrator cannot continue beyond this time.
     StepSizeUnderflow {
         /// The time that was reached.
         t: f64,
-        /// The step that would be next.
+        /// The next step size.
         h: f64,
-        /// Why the one before was refused.
+        /// Why the last step was rejected.
         reason: Refusal,
-        /// Where Newton's method did not converge: what does not settle.
+        /// If Newton's method did not converge: the equation and the unknown that do not settle.
         unsettled: Option<Unsettled>,
     },
-    /// An adaptive integrator needs more steps than its options allow.
+    /// An adaptive integrator exceeds the maximal number of steps.
     TooManySteps {
         /// The time that was reached.
         t: f64,
-        /// How many steps were tried.
+        /// Number of attempted steps.
         steps: usize,
-        /// Whether the method is explicit and its stability limited most of them, not the error.
+        /// Whether the method is explicit, and most steps were limited by its stability instead of
+        /// the error.
         stiff: bool,
-        /// The factor by which tolerances have to be larger, if the method is explicit and rounding
-        /// errors of the model limited most steps: then about half of `max_steps` suffice.
+        /// Factor by which tolerances must be increased, if the method is explicit and most steps
+        /// were limited by rounding errors of the model: about half of `max_steps` then suffice.
         rounding: Option<f64>,
     },
     /// A time outside the interval of the last successful call.
     OutsideInterval {
         /// The time.
         t: f64,
-        /// Begin of the interval.
+        /// Start of the interval.
         start: f64,
         /// End of the interval.
         end: f64,
     },
-    /// Times of a list, ends of intervals or those of outputs, that are not in order: each lies
-    /// between the one before it and the end.
+    /// Times in a list (ends of intervals, or output times) are not in order: each must lie between
+    /// the preceding one and the end.
     Unordered {
-        /// Which one of the list.
+        /// Index in the list.
         index: usize,
         /// The time.
         t: f64,
-        /// The time before it, or the start.
+        /// The preceding time, or the start.
         before: f64,
         /// The end.
         end: f64,
     },
-    /// Events come sooner and sooner after each other, without end before a time (the paradox of
-    /// Zeno): from there on a ball that bounces lies on the ground.
+    /// Events accumulate at a time (Zeno's paradox), as those of a bouncing ball before it comes to
+    /// rest.
     AccumulatingEvents {
-        /// The time at which they accumulate, as far as the last three foretell it.
+        /// The accumulation time, extrapolated from the last three events.
         t: f64,
-        /// The function of the event.
+        /// The event function.
         function: &'static str,
-        /// Which event it is.
+        /// Index of the event.
         event: usize,
-        /// How many events happened.
+        /// Number of events so far.
         events: usize,
     },
-    /// More events than are allowed.
+    /// The number of events exceeds its maximum.
     TooManyEvents {
         /// The time that was reached.
         t: f64,
-        /// How many events happened.
+        /// Number of events so far.
         events: usize,
     },
-    /// A function touches zero and does not cross it: the time of the event has no derivative.
+    /// An event function touches zero without crossing it (grazing): the event time has no
+    /// derivative.
     Grazing {
-        /// Which event.
+        /// Index of the event.
         event: usize,
-        /// Its function.
+        /// The event function.
         function: &'static str,
-        /// Its time.
+        /// The event time.
         t: f64,
     },
-    /// Second derivatives over an event of a function that looks at algebraic states.
+    /// Second derivatives across an event whose function depends on algebraic states are not
+    /// available.
     GuardOfAlgebraicStates {
-        /// The function.
+        /// The event function.
         function: &'static str,
     },
-    /// Second derivatives over an event need that nothing there depends on the time; first ones
-    /// over that of a function of algebraic states need it of the model.
+    /// Second derivatives across an event require that neither the model nor the event functions
+    /// depend on the time; first ones across an event of algebraic states require it of the model.
     DependsOnTime {
-        /// What does.
+        /// What depends on the time.
         function: &'static str,
     },
-    /// Not one control for each interval, or no interval at all.
+    /// The number of controls differs from the number of intervals, or there is no interval.
     Intervals {
-        /// How many controls there are.
+        /// Number of controls.
         controls: usize,
-        /// How many ends of intervals there are.
+        /// Number of ends of intervals.
         ends: usize,
     },
-    /// The nodes of the tableau define no polynomial through the stages: there is no dense output,
-    /// and there are no algebraic states at the ends of the interval.
+    /// The nodes of the tableau define no polynomial through the stages: dense output, and
+    /// algebraic states at the ends of the interval, are not available.
     NoInterpolation,
-    /// A question about the last successful call, and there was none.
+    /// The result of the last successful call was requested before any call succeeded.
     NoResult,
-    /// The end of an interval could not be projected onto the invariants of the model.
+    /// The final state could not be projected onto the invariants of the model.
     NotProjected {
-        /// The equation of the invariant that is violated most.
+        /// Equation of the constraint with the largest violation.
         equation: u32,
-        /// Which derivative of it the invariant is.
+        /// Order of the derivative of the constraint.
         derivative: u32,
-        /// By how much.
+        /// The largest violation.
         residual: f64,
     },
     /// The memory of a mode could not be allocated.
     OutOfMemory {
-        /// Its size; the largest number if that is not even a number.
+        /// Size of the memory; the maximum of `usize` if it overflows.
         bytes: usize,
     },
 }
@@ -281,7 +284,7 @@ impl From<TableauError> for Error {
     }
 }
 
-/// Why a step was refused.
+/// Why a step was rejected.
 ///
 /// ```
 /// # use casados::error::Refusal;
@@ -302,25 +305,25 @@ impl From<TableauError> for Error {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Its estimated error was too large.
+    /// The estimated error was too large.
     Error,
     /// Newton's method did not converge.
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
-    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
-    /// equations meet there, and none is beyond (a fold).
+    /// `∂f/∂(ẋ, z)` becomes singular at the end of the last step: two solutions of the algebraic
+    /// equations meet and end there (fold).
     SingularAlgebraic {
-        /// The algebraic state along which it does.
+        /// The algebraic state along which the matrix becomes singular.
         unknown: &'static str,
     },
-    /// The model returned an infinite value or NaN, or the numbers overflowed.
+    /// The model returned an infinite value or NaN, or numbers overflowed.
     NotFinite,
-    /// The interval is shorter than the distance of the time from the next number.
+    /// The interval is shorter than the spacing of floating-point numbers at the time.
     Resolution,
 }
 
-/// An algebraic state, and where Newton's method started for it.
+/// An algebraic state, and its start value in Newton's method.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -341,13 +344,13 @@ pub enum Refusal {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Started {
-    /// Its name.
+    /// Name of the state.
     pub unknown: &'static str,
     /// Its start value.
     pub value: f64,
 }
 
-/// What does not settle where Newton's method converges in no step, however short.
+/// The equation and the unknown that do not settle, if Newton's method converges for no step size.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -366,15 +369,16 @@ pub struct Started {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Unsettled {
-    /// The equation with the largest residual beside its terms, where the last iteration ended.
+    /// The equation with the largest residual relative to its terms, at the end of the last
+    /// iteration.
     pub equation: usize,
-    /// This residual relative to the terms.
+    /// Residual of this equation, relative to its terms.
     pub residual: f64,
-    /// The unknown that the last increment changed most beside its tolerance: the state whose
-    /// derivative it is, or the algebraic state.
+    /// The unknown with the largest last increment relative to its tolerance: an algebraic state,
+    /// or the state of a derivative.
     pub unknown: &'static str,
-    /// The value of this state at the time that was reached.
+    /// Value of this state at the time that was reached.
     pub value: f64,
-    /// Whether it is an algebraic state.
+    /// Whether the state is algebraic.
     pub algebraic: bool,
 }

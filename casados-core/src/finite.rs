@@ -1,4 +1,4 @@
-//! Finite checks: of what is given, and of what is returned.
+//! Checks of inputs and outputs for non-finite values.
 
 use crate::error::{Argument, Error};
 use crate::linalg::{are_finite, kernels};
@@ -7,7 +7,7 @@ use crate::result::{Forward, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain};
 
-/// Of what has no names: times and lengths.
+/// Checks inputs without names: times and lengths.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
@@ -18,7 +18,7 @@ pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(
     }
 }
 
-/// Of what the model has names for.
+/// Checks inputs with names in the model.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
@@ -31,7 +31,7 @@ pub(crate) fn check_model_input<M: Dae, T: Real>(argument: Argument, values: &[T
     }
 }
 
-/// What the model calls an element of an argument; of several columns each has these names.
+/// Returns the name of an element of an argument in the model; every column has the same names.
 pub(crate) fn element_name<M: Dae>(argument: Argument, index: usize) -> &'static str {
     let structure = &M::STRUCTURE;
     let names = match argument {
@@ -44,8 +44,10 @@ pub(crate) fn element_name<M: Dae>(argument: Argument, index: usize) -> &'static
     index.checked_rem(names.len()).and_then(|index| names.get(index)).copied().unwrap_or("")
 }
 
+/// Checks an output.
+///
 /// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
+/// [`Error::Overflow`] for the first non-finite element.
 pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
     match find_non_finite(values) {
         Some((index, _)) => Err(Error::Overflow { step, index }),
@@ -53,8 +55,10 @@ pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Err
     }
 }
 
+/// Checks forward derivatives.
+///
 /// # Errors
-/// [`Error::Overflow`] of the first derivative that is not finite.
+/// [`Error::Overflow`] for the first non-finite derivative.
 #[cfg_attr(feature = "std", inline(never))]
 pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
     for values in [
@@ -73,10 +77,10 @@ pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize
     Ok(())
 }
 
-/// A gradient by `x₀`, `u` and `p`.
+/// Checks a gradient by `x₀`, `u` and `p`.
 ///
 /// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
+/// [`Error::Overflow`] for the first non-finite element.
 #[inline(always)]
 pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), Error> {
     check_output(x0, 0)?;
@@ -84,8 +88,10 @@ pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), 
     check_output(p, 0)
 }
 
+/// Checks second derivatives.
+///
 /// # Errors
-/// [`Error::Overflow`] of the first second derivative that is not finite.
+/// [`Error::Overflow`] for the first non-finite second derivative.
 pub(crate) fn check_second_derivatives<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
     for values in result.second_derivative_blocks() {
         check_output(values, 0)?;
@@ -102,10 +108,10 @@ impl<M: Dae, T: Plain> Hessian<M, T> {
     }
 }
 
-/// The first element that is infinite or NaN.
+/// Returns the first element that is infinite or NaN.
 #[inline]
 pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
-    // A few are looked at before the function for many is entered.
+    // Short slices are checked without the call of a kernel.
     let finite = if values.len() < 16 { are_finite(values) } else { are_all_finite(values) };
     if finite {
         return None;
@@ -113,8 +119,8 @@ pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     first_non_finite(values)
 }
 
-/// The first of elements that are not all finite. Without an operating system callers see where it
-/// may be.
+/// Returns the first non-finite element. Inlined without an operating system, so that the optimiser
+/// sees the range of the index.
 #[cfg_attr(feature = "std", cold, inline(never))]
 #[cfg_attr(not(feature = "std"), inline(always))]
 fn first_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {

@@ -1,14 +1,13 @@
-//! The engine of `casados`: **use `casados`, this crate is a part of it.**
+//! The engine of `casados`: **use `casados`, of which this crate is a part.**
 //!
-//! Its modules are the rooms of the source, and its paths may change in any version; those of
-//! `casados` follow semantic versioning.
+//! Paths of modules may change in any version; those of `casados` follow semantic versioning.
 //!
 //! Implicit and explicit Runge-Kutta methods for differential-algebraic equations
 //! `f(ẋ, x, u, z, p, t) = 0`, with forward, adjoint and second-order sensitivities that are the
 //! exact derivatives of the discrete step. `no_std`; memory is static, or on the heap with the
 //! feature `alloc`.
 //!
-//! A model is a type that implements [`Dae`]; the attributes of `casados-macros` write that
+//! A model is a type that implements [`Dae`]; the attributes of `casados-macros` generate the
 //! implementation from a Rust function.
 #![no_std]
 #![deny(unsafe_code)]
@@ -29,8 +28,8 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
-/// `Debug` of an error is its text: a `main` that returns `Result` prints `Debug`, and so does
-/// `unwrap`.
+/// Implements `Debug` of an error by its text, since `unwrap`, and `main` with a `Result`, print
+/// `Debug`.
 macro_rules! debug_is_display {
     ($error:ty) => {
         impl core::fmt::Debug for $error {
@@ -109,10 +108,10 @@ pub use tableau::{
     Tableau, TableauError,
 };
 
-// What vectors and matrices of arguments and results are made of.
+// Vectors and matrices of arguments and results are nalgebra types.
 pub use nalgebra;
 
-/// What the attributes write, and tests of the engine read: any version may change it.
+/// Used by generated code and by tests of the engine; may change in any version.
 #[doc(hidden)]
 pub mod __private {
     #[cfg(feature = "num-dual")]

@@ -1,10 +1,10 @@
-//! Where the memory of an integrator is.
+//! The memory of integrators.
 //!
-//! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated, zeroed,
-//!   by the first call of that mode or when it is reserved; no later call allocates. Large models
-//!   never touch the stack.
-//! - [`Inline`]: everything is inside the integrator itself, for one mode that is part of the type
-//!   and at most `STEPS` steps. A call that the mode has no memory for does not compile:
+//! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated and
+//!   zeroed by the first call of that mode, or when it is reserved; later calls do not allocate.
+//!   Large models do not use the stack.
+//! - [`Inline`]: all memory is inside the integrator, for one mode, which is part of the type, and
+//!   at most `STEPS` steps. A call of another mode does not compile:
 //!
 //! ```
 //! # use casados_core::{Dae, Error, Gauss, Inline, Irk, mode, model::{VectorU, VectorX}};
@@ -41,13 +41,13 @@ use crate::error::Error;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// What memory can hold.
+/// A type that memory can hold.
 pub trait Stored: Zeroable + Send + Sync + 'static {}
 impl<V: Zeroable + Send + Sync + 'static> Stored for V {}
 
-/// Values with a number of columns, one type for each number: seeds or directions.
+/// A family of types with a number of columns (seeds or directions), one type for each number.
 pub trait Family: 'static {
-    /// That of `C` columns.
+    /// The type for `C` columns.
     type Of<const C: usize>: Stored;
 }
 
@@ -55,7 +55,7 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// Where memory is: [`Heap`] or [`Inline`].
+/// The memory of an integrator: [`Heap`] or [`Inline`].
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -77,40 +77,40 @@ mod sealed {
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub trait Memory: sealed::Sealed + 'static {
-    /// A place for what every call needs.
+    /// Memory of all calls.
     type Nominal<V: Stored>: Default + Send + Sync;
-    /// A place for what is remembered of every step.
+    /// Memory of the steps.
     type Tape<V: Stored>: Default + Send + Sync;
-    /// A place for forward sensitivities.
+    /// Memory of forward sensitivities.
     type Forward<V: Stored>: Default + Send + Sync;
-    /// A place for forward sensitivities in given directions.
+    /// Memory of forward sensitivities in given directions.
     type Directional<V: Family>: Default + Send + Sync;
-    /// A place for adjoint sensitivities.
+    /// Memory of adjoint sensitivities.
     type Adjoint<V: Family>: Default + Send + Sync;
-    /// A place for second-order sensitivities.
+    /// Memory of second-order sensitivities.
     type Hessian<V: Stored>: Default + Send + Sync;
-    /// A place for what second-order sensitivities remember of every step.
+    /// Memory of the steps for second-order sensitivities.
     type HessianTape<V: Stored>: Default + Send + Sync;
 
-    /// What is done where the planned elimination is not good enough.
+    /// The fallback if the planned elimination is too inaccurate.
     type Fallback: Fallback;
 
-    /// The most steps that there is memory for.
+    /// The maximal number of steps.
     const STEPS: usize;
 
-    /// Memory of what every call needs.
+    /// Returns the memory of all calls.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn nominal<V: Stored>(place: &mut Self::Nominal<V>) -> Result<&mut V, Error>;
-    /// Memory of the steps.
+    /// Returns the memory of the steps.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn tape<V: Stored>(place: &mut Self::Tape<V>, steps: usize) -> Result<&mut [V], Error>;
 }
 
-/// Memory with a place for forward sensitivities.
+/// Memory with forward sensitivities.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -136,14 +136,14 @@ pub trait Memory: sealed::Sealed + 'static {
     note = "use `Heap`, `Inline<mode::Forward>` or `Inline<mode::Hessian>`"
 )]
 pub trait WithForward: Memory {
-    /// The memory.
+    /// Returns the memory.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn forward<V: Stored>(place: &mut Self::Forward<V>) -> Result<&mut V, Error>;
 }
 
-/// Memory with a place for `C` directions.
+/// Memory with `C` directions.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -165,14 +165,14 @@ pub trait WithForward: Memory {
     note = "use `Heap` or `Inline<mode::Directional<{C}>>`"
 )]
 pub trait WithDirectional<const C: usize>: Memory {
-    /// The memory.
+    /// Returns the memory.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn directional<V: Family>(place: &mut Self::Directional<V>) -> Result<&mut V::Of<C>, Error>;
 }
 
-/// Memory with a place for the adjoint of `C` seeds.
+/// Memory with the adjoint of `C` seeds.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -198,14 +198,14 @@ pub trait WithDirectional<const C: usize>: Memory {
     note = "use `Heap` or `Inline<mode::Adjoint<{C}>>`"
 )]
 pub trait WithAdjoint<const C: usize>: Memory {
-    /// The memory.
+    /// Returns the memory.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn adjoint<V: Family>(place: &mut Self::Adjoint<V>) -> Result<&mut V::Of<C>, Error>;
 }
 
-/// Memory with a place for second-order sensitivities.
+/// Memory with second-order sensitivities.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -231,19 +231,19 @@ pub trait WithAdjoint<const C: usize>: Memory {
     note = "use `Heap` or `Inline<mode::Hessian>`"
 )]
 pub trait WithHessian: WithForward {
-    /// The memory.
+    /// Returns the memory.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn hessian<V: Stored>(place: &mut Self::Hessian<V>) -> Result<&mut V, Error>;
-    /// Memory of the steps.
+    /// Returns the memory of the steps.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn hessian_tape<V: Stored>(place: &mut Self::HessianTape<V>, steps: usize) -> Result<&mut [V], Error>;
 }
 
-/// No place.
+/// The absence of memory.
 #[derive(Clone, Copy, Debug, Default, Zeroable)]
 pub struct Absent;
 
@@ -257,19 +257,19 @@ impl<V: Zeroable> Default for Inside<V> {
     }
 }
 
-/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps; with what
-/// it is to fall back on ([`fallback`]), or without.
+/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps, with or
+/// without the memory of a [`fallback`].
 ///
-/// An integrator has the constant `SIZE`, how many bytes it takes: there are no others. For a
-/// pendulum on a cart (four states, a control) in `f64` on a 32-bit processor:
+/// The constant `SIZE` of an integrator is its total memory in bytes. For a pendulum on a cart
+/// (four states, a control) in `f64` on a 32-bit processor:
 ///
 /// | integrator | [`mode::Nominal`] | [`mode::Forward`] | [`mode::Adjoint`] | [`mode::Hessian`] |
 /// |---|---|---|---|---|
 /// | `Irk`, `Gauss<2>` | 2632 | 4104 | 2952 | 8112 |
 /// | `Erk`, `Rk4` | 1344 | 2912 | 1344 | 3872 |
 ///
-/// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`,
-/// for the target that it is asked for.
+/// For other models, define a public constant equal to `SIZE`: `cargo doc` prints its value for the
+/// given target.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -294,7 +294,7 @@ pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomD
 
 impl<Mode, const STEPS: usize, F> sealed::Sealed for Inline<Mode, STEPS, F> {}
 
-/// The places of one mode.
+/// Implements the memory of one mode.
 macro_rules! inline {
     ([$($constant:ident)?] $mode:ty {
         forward: $forward:ty, directional: $directional:ty, adjoint: $adjoint:ty, hessian: $hessian:ty, hessian_tape: $tape:ty,

@@ -1,19 +1,19 @@
-//! What can be chosen about an integrator.
+//! Options of integrators.
 
 use crate::error::Error;
 
-/// Solutions without a digit that is right are none.
+/// The largest relative tolerance: one correct digit.
 const MAX_RTOL: f64 = 0.1;
-/// Newton's method is there after a few dozens, or never.
+/// The largest number of iterations; Newton's method converges within a few dozen, if at all.
 const MAX_ITERATIONS: usize = 10_000;
 
-/// What can be chosen about an integrator.
+/// Options of an integrator.
 ///
-/// Newton's method to rounding and one step are the defaults. A later version may have more fields:
-/// write `..Default::default()`.
+/// The defaults are one step, and Newton's method to rounding. A later version may have more
+/// fields: write `..Default::default()`.
 ///
 /// # Errors
-/// What makes no sense is [`Error::InvalidOption`] of the integrator that is made with it.
+/// Invalid values are [`Error::InvalidOption`] of the constructor of the integrator.
 ///
 /// # Example
 /// ```
@@ -33,28 +33,27 @@ const MAX_ITERATIONS: usize = 10_000;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Steps of equal size in one interval, at least one. Default 1.
+    /// Number of equal steps in an interval, at least one. Default 1.
     pub steps: usize,
-    /// How the stages of an implicit method are solved; explicit methods do not read it.
-    /// Default: those of [`Newton`].
+    /// Newton's method for the stages of an implicit method; explicit methods do not read it.
+    /// Default: that of [`Newton`].
     pub newton: Newton,
-    /// Where Newton's method starts. Default [`Start::Nominal`].
+    /// The initial guess of Newton's method. Default [`Start::Nominal`].
     pub start: Start,
-    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's
-    /// summation), and implicit methods compute the sums of their stages with twice the digits: for
-    /// thousands of steps in one interval, where rounding errors of `x` would add up.
-    /// Default false.
+    /// Whether sums over the steps are compensated (Kahan summation), and implicit methods compute
+    /// the sums of their stages with twice the digits: for thousands of steps in one interval,
+    /// where rounding errors of `x` accumulate. Default false.
     pub compensated: bool,
 }
 
 impl Default for Options {
-    /// One step; Newton to rounding, from the nominal values of the model.
+    /// One step; Newton's method to rounding, from the nominal values of the model.
     fn default() -> Self {
         Self { steps: 1, newton: Newton::default(), start: Start::default(), compensated: false }
     }
 }
 
-/// How the equations of the stages are solved.
+/// Newton's method for the equations of the stages.
 ///
 /// A later version may have more fields: write `..Default::default()`.
 ///
@@ -67,19 +66,19 @@ impl Default for Options {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// The iteration ends when its error is expected below this, relative to the size of each
-    /// unknown (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
-    /// Between zero and 0.1; zero, the default, means rounding: a few units in the last place of
-    /// the number type.
+    /// Tolerance of the iteration: it ends when its predicted error is below this, relative to the
+    /// size of each unknown; for a derivative `ẋ` an error below the rounding of `x/h`, which does
+    /// not change `x`, is also accepted. Between zero and 0.1; zero, the default, means rounding: a
+    /// few units in the last place of the number type.
     pub tolerance: f64,
-    /// With a tolerance: more iterations than these are the error `NotConverged`. Between 1 and
-    /// 10000; 50 by default.
+    /// Maximal number of iterations with a tolerance; more are the error `NotConverged`. Between 1
+    /// and 10000; default 50.
     pub max_iterations: usize,
-    /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
+    /// The Jacobian of the iteration. Sensitivities always use the Jacobian at the solution.
     /// Default [`Jacobian::Auto`].
     pub jacobian: Jacobian,
-    /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run
-    /// time in every call. Default `None`: as many as the tolerance asks for.
+    /// A fixed number of iterations, between 1 and 10000, without a convergence test: every call
+    /// has the same run time. Default `None`: iterations until convergence.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -99,43 +98,42 @@ impl Default for Newton {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Jacobian {
-    /// That of the start values in the first step, that of the last step in later ones; evaluated
-    /// and factorised anew as soon as the iterations that are still expected with it cost more (by
-    /// the counts of operations in the model's structure, and the rate at which increments shrink,
-    /// or after the first one the residual). With three stages or more a new one is `Simplified` up
-    /// to three times in a step. With a fixed number of iterations as `Full`.
+    /// The Jacobian of the initial guess in the first step, that of the last step in later ones;
+    /// updated as soon as the predicted iterations with it cost more than an update. The prediction
+    /// uses the operation counts of the model's structure and the contraction rate, or after the
+    /// first increment the residual. With three stages or more an update is `Simplified`, at most
+    /// three times in a step. With a fixed number of iterations as `Full`.
     #[default]
     Auto,
-    /// The mean of the stages' Jacobians, in the eigenbasis of the tableau; renewed as with `Auto`.
-    /// Tableaux of one or two stages, or without such a basis, take `Auto`.
+    /// The mean of the Jacobians of the stages, in the eigenbasis of the tableau (Butcher
+    /// transformation); updated as with `Auto`. Tableaux of one or two stages, or without such a
+    /// basis, use `Auto`.
     Simplified,
-    /// Evaluated and factorised in every iteration. No increment is rejected for its growth, as
-    /// those of older Jacobians are: the iterates are those of Newton's method.
+    /// Evaluated and factorised in every iteration. Increments are not rejected for their growth,
+    /// as those with older Jacobians are: the iterates are those of Newton's method.
     Full,
-    /// Evaluated and factorised once in each step, at the start values; once more only where
-    /// increments do not shrink to half of the last one. (With a fixed number of iterations this is
-    /// not asked.)
+    /// Evaluated and factorised once in each step, at the initial guess; updated only if increments
+    /// do not halve. (A fixed number of iterations has no updates.)
     Frozen,
 }
 
 impl Jacobian {
-    /// Whether old factors, and those of the mean of the stages, do as long as they cost less than
-    /// new ones.
+    /// Whether old and shared Jacobians are used while they are cheaper than updates.
     pub(crate) fn is_adaptive(self) -> bool {
         matches!(self, Self::Auto | Self::Simplified)
     }
 }
 
-/// Where Newton's method starts in the first step of a call.
+/// The initial guess of Newton's method in the first step of a call.
 ///
-/// In the steps after it the start is the polynomial through the stages of the step before; with
-/// five stages or more the algebraic states start at those of its last stage. So a call stays on
-/// the branch on which its first step was.
+/// In later steps the initial guess is the polynomial through the stages of the preceding step;
+/// with five stages or more the algebraic states start at those of its last stage. So a call stays
+/// on the branch of its first step.
 ///
-/// Where the equations have several roots, as `z² = x` does, the start decides for one, and a root
-/// that nobody wants looks like any other: say where the model lives, `#[dae(nominal(z = 0.1))]`,
-/// or give values with `set_start`. Where a residual has no value at `z = 0`, as that of `ln z`, or
-/// a matrix there is singular, as that of `z² = x`, there is no solution without such values.
+/// If the equations have several roots, as those of `z² = x`, the initial guess selects one, and an
+/// undesired root is not detected: declare the range of the model, `#[dae(nominal(z = 0.1))]`, or
+/// give values with `set_start`. If a residual has no value at `z = 0`, as that of `ln z`, or a
+/// matrix is singular there, as that of `z² = x`, such values are required.
 ///
 /// ```
 /// use casados::options::Start;
@@ -159,31 +157,29 @@ impl Jacobian {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Start {
-    /// The values of `set_start` if it was called, else the nominal values of the model,
-    /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or, where there is none, at the
-    /// geometric mean of a `range(..)` that does not contain zero; else at zero. `ẋ` is zero,
-    /// unless the equations are nonlinear in it and it has a nominal value. The same input gives
-    /// the same bits in every call.
+    /// The values of `set_start` if it was called, otherwise the nominal values of the model,
+    /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or without one at the geometric
+    /// mean of a `range(..)` that does not contain zero, otherwise at zero. `ẋ` is zero, unless the
+    /// equations are nonlinear in it and it has a nominal value. Results are bitwise reproducible.
     #[default]
     Nominal,
-    /// `ẋ = 0` and `z = 0`, whatever the nominal values are.
+    /// `ẋ = 0` and `z = 0`, independently of the nominal values.
     Zero,
     /// The values of `set_start`; an error if it was not called.
     Given,
-    /// The stages of the same step in the last successful call; in the first one as with `Nominal`.
-    /// A branch that was found once is kept from call to call, until `reset`.
+    /// The stages of the same step in the last successful call; in the first call as `Nominal`. All
+    /// calls stay on the branch that was found first, until `reset`.
     Warm,
 }
 
 impl Options {
-    /// Stages lifted to the level of a problem of optimal control, which then solves their
-    /// equations too: each call takes one iteration, from the stages of the last one (in the first
-    /// call from the nominal values). Stages converge with the iterates instead of in every one of
-    /// them, and at convergence agree with those of any other options (R. Quirynen, S. Gros, M.
-    /// Diehl, "Lifted implicit integrators for direct optimal control", CDC 2015). Until then ends
-    /// of intervals have errors of second order in the last step; derivatives are exact at the
-    /// stages that there are. Whether that saves more than an iteration more of the problem costs
-    /// is to be measured.
+    /// Returns options with lifted stages for an optimal control problem, which then solves their
+    /// equations too: each call makes one iteration, from the stages of the last one (in the first
+    /// call from the nominal values). Stages converge together with the iterates of the problem,
+    /// and at convergence agree with those of any other options (R. Quirynen, S. Gros, M. Diehl,
+    /// "Lifted implicit integrators for direct optimal control", CDC 2015). Until then, ends of
+    /// intervals have errors of second order in the last step; derivatives are exact at the present
+    /// stages. Measure whether it saves more than the additional iterations of the problem cost.
     ///
     /// ```
     /// # use casados_core::options::{Options, Start};
@@ -196,8 +192,10 @@ impl Options {
         Self { newton, start: Start::Warm, ..self }
     }
 
+    /// Checks the options.
+    ///
     /// # Errors
-    /// [`Error::InvalidOption`] for the first value that makes no sense.
+    /// [`Error::InvalidOption`] for the first invalid value.
     pub fn check(&self) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
         if self.steps == 0 {

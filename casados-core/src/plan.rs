@@ -1,44 +1,43 @@
-//! What kernels know of a model, bound when they are compiled or when they run.
+//! The structure of a model for kernels, bound at compile time or at run time.
 //!
 //! | | kernels are compiled | loops over tables | lengths |
 //! | --- | --- | --- | --- |
-//! | [`Known<M>`](Known) | for each model | unrolled where they are short | constants |
+//! | [`Known<M>`](Known) | for each model | unrolled if short | constants |
 //! | [`&'static ModelTable`](ModelTable) | once for all models | loops | read |
 //!
-//! A kernel is generic over its plan and has it as a value, which is nothing at all where the model
-//! is known. Decisions that need constants ask [`Plan::KNOWN_STRUCTURE`].
+//! A kernel is generic over its plan and has it as a value, which has no size if the model is known
+//! at compile time. Decisions that need constants use [`Plan::KNOWN_STRUCTURE`].
 
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::shape::{Plain, Shape};
 use crate::structure::{Kinematic, Structure};
 use core::marker::PhantomData;
 
-/// What has so many elements: an array where the model is known, or a slice.
+/// An array if the model is known at compile time, otherwise a slice.
 pub trait Elements<T>: AsRef<[T]> + AsMut<[T]> {}
 impl<T, A: AsRef<[T]> + AsMut<[T]> + ?Sized> Elements<T> for A {}
 
-/// The plan by which a kernel computes.
+/// The plan of a kernel.
 pub trait Plan: Copy + Send + Sync + 'static {
-    /// The structure of the model, if kernels are compiled for that one.
+    /// The structure of the model, if kernels are compiled for one model.
     const KNOWN_STRUCTURE: Option<&'static Structure>;
-    /// How many columns there is memory for where directions are computed side by side, if that is
-    /// known.
+    /// Number of columns of the memory for directions, if it is known.
     const NC: usize;
 
-    /// An element for each differential state.
+    /// One element per differential state.
     type X<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each unknown of a stage, or for each equation.
+    /// One element per unknown of a stage, or per equation.
     type K<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each variable.
+    /// One element per variable.
     type V<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each entry of the Jacobian.
+    /// One element per entry of the Jacobian.
     type Jacobian<T: Plain>: Elements<T> + ?Sized;
-    /// An element for each block of the factors.
+    /// One element per block of the factors.
     type Factors<T: Plain>: Elements<T> + ?Sized;
 
-    /// The structure of the model.
+    /// Returns the structure of the model.
     fn structure(self) -> &'static Structure;
-    /// What follows from it.
+    /// Returns the facts derived from the structure.
     fn facts(self) -> &'static DerivedFacts;
 
     /// The number of differential states.
@@ -72,8 +71,7 @@ pub trait Plan: Copy + Send + Sync + 'static {
         self.nx() + self.nu() + self.structure().p.len()
     }
 
-    /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it
-    /// is.
+    /// Returns the row of an equation in right-hand sides: that of the unknown whose pivot it is.
     #[inline(always)]
     fn slot(self, equation: usize) -> usize {
         match self.structure().elimination.slot_of_equation.get(equation) {
@@ -82,20 +80,20 @@ pub trait Plan: Copy + Send + Sync + 'static {
         }
     }
 
-    /// What is known of the state of a slot, if it is [kinematic](Kinematic).
+    /// Returns the kinematic state of a slot, if it is [kinematic](Kinematic).
     #[inline(always)]
     fn kinematic(self, slot: usize) -> Option<&'static Kinematic> {
         kinematic(self.structure(), slot)
     }
 
-    /// The state that is the velocity of a kinematic one, if it is a state.
+    /// Returns the unknown of the velocity of a kinematic state, if the velocity is a state.
     #[inline(always)]
     fn velocity(self, of: &Kinematic) -> Option<usize> {
         let (nx, velocity) = (self.nx(), of.velocity as usize);
         if velocity < 2 * nx { velocity.checked_sub(nx) } else { None }
     }
 
-    /// An entry of a Jacobian: row, column, value.
+    /// Returns an entry of a Jacobian: row, column, value.
     #[inline(always)]
     fn entry<V>(self, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
         let pattern = &self.structure().jacobian;
@@ -105,25 +103,25 @@ pub trait Plan: Copy + Send + Sync + 'static {
     }
 }
 
-/// A plan of this model, which takes the arrays that the model has.
+/// A plan of this model, with conversions from the arrays of the model.
 pub trait PlanOf<M: Dae>: Plan {
-    /// An element for each differential state.
+    /// One element per differential state.
     fn x<T: Plain>(of: &ArrayX<M, T>) -> &Self::X<T>;
-    /// An element for each unknown of a stage, or for each equation.
+    /// One element per unknown of a stage, or per equation.
     fn k<T: Plain>(of: &ArrayK<M, T>) -> &Self::K<T>;
-    /// The same.
+    /// One element per unknown of a stage, or per equation.
     fn k_mut<T: Plain>(of: &mut ArrayK<M, T>) -> &mut Self::K<T>;
-    /// An element for each variable.
+    /// One element per variable.
     fn v<T: Plain>(of: &ArrayV<M, T>) -> &Self::V<T>;
-    /// The same.
+    /// One element per variable.
     fn v_mut<T: Plain>(of: &mut ArrayV<M, T>) -> &mut Self::V<T>;
-    /// An element for each entry of the Jacobian.
+    /// One element per entry of the Jacobian.
     fn jacobian<T: Plain>(of: &M::Jacobian<T>) -> &Self::Jacobian<T>;
-    /// An element for each block of the factors.
+    /// One element per block of the factors.
     fn factors_mut<T: Plain>(of: &mut M::Factors<T>) -> &mut Self::Factors<T>;
 }
 
-/// Arrays of a model as a plan has them.
+/// Converts arrays of a model to those of a plan.
 macro_rules! arrays {
     ($M:ident: $of:ident => $as_ref:expr, $as_mut:expr) => {
         #[inline(always)]
@@ -157,7 +155,7 @@ macro_rules! arrays {
     };
 }
 
-/// The plan of a model that is known when kernels are compiled.
+/// The plan of a model that is known at compile time.
 pub struct Known<M>(PhantomData<fn() -> M>);
 
 impl<M> Known<M> {
@@ -175,7 +173,7 @@ impl<M> Copy for Known<M> {}
 
 impl<M: Dae> Plan for Known<M> {
     const KNOWN_STRUCTURE: Option<&'static Structure> = Some(&M::STRUCTURE);
-    // As many as the rows of `ArrayC` have.
+    // The length of the rows of `ArrayC`.
     const NC: usize = if cfg!(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
         M::Shape::NC
     } else {
@@ -200,7 +198,7 @@ impl<M: Dae> PlanOf<M> for Known<M> {
     arrays!(M: of => of, of);
 }
 
-/// The plan of any model, which kernels read when they run.
+/// The plan of any model, read by kernels at run time.
 #[derive(Debug)]
 pub struct ModelTable {
     structure: &'static Structure,
@@ -208,7 +206,7 @@ pub struct ModelTable {
 }
 
 impl ModelTable {
-    /// That of a model.
+    /// Returns the table of a model.
     pub const fn of(structure: &'static Structure) -> Self {
         Self { structure, facts: DerivedFacts::of(structure) }
     }
@@ -236,7 +234,7 @@ impl<M: Dae> PlanOf<M> for &'static ModelTable {
     arrays!(M: of => of.as_ref(), of.as_mut());
 }
 
-/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+/// Returns the kinematic state of a slot, if it is [kinematic](Kinematic).
 #[inline(always)]
 pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Kinematic> {
     let kinematic = structure.elimination.kinematic;
@@ -247,35 +245,36 @@ pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Ki
     }
 }
 
-/// What follows from a structure, found when the model is compiled.
+/// Facts derived from a structure at compile time.
 #[derive(Debug)]
 pub struct DerivedFacts {
-    /// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
+    /// The range `(first, end)` of unknowns without the kinematic states before the first and after
+    /// the last other unknown.
     pub non_kinematic_range: (usize, usize),
-    /// Terms of the Newton matrix that are fill.
+    /// Number of assembly terms that are fill-in.
     pub fill_terms: usize,
-    /// How many curved variables come before the first state, and before the first algebraic state.
+    /// Numbers of nonlinear variables before the first state, and before the first algebraic state.
     pub nonlinear_before: [usize; 2],
-    /// Whether each equation that has a derivative has that of one state, in their order: the
-    /// entries of `f_ẋ` then are those of the states.
+    /// Whether each equation with a derivative has that of one state, in the order of the states:
+    /// the entries of `f_ẋ` are then in this order.
     pub has_direct_rates: bool,
 }
 
 impl DerivedFacts {
-    /// Those of a structure.
+    /// Derives the facts of a structure.
     pub const fn of(structure: &Structure) -> Self {
         let nx = structure.x.len();
         Self {
             non_kinematic_range: non_kinematic_range(structure),
             fill_terms: structure.elimination.fill(),
             nonlinear_before: [count_before(structure.curved, nx), count_before(structure.curved, 2 * nx)],
-            has_direct_rates: has_direct_rates(structure),
+            has_direct_rates: has_ordered_derivatives(structure),
         }
     }
 }
 
-/// How many of some numbers, in their order, come before one: of directions that have any
-/// influence, of curved variables.
+/// Returns how many elements of an ascending list (directions with influence, nonlinear variables)
+/// are less than `number`.
 pub const fn count_before(numbers: &[u32], number: usize) -> usize {
     let mut count = 0;
     while count < numbers.len() && (numbers[count] as usize) < number {
@@ -295,8 +294,8 @@ const fn non_kinematic_range(structure: &Structure) -> (usize, usize) {
     (first, end)
 }
 
-/// See [`Facts`].
-pub const fn has_direct_rates(structure: &Structure) -> bool {
+/// See [`DerivedFacts::has_direct_rates`].
+pub const fn has_ordered_derivatives(structure: &Structure) -> bool {
     let (count, pattern) = (structure.blocks[1], &structure.jacobian);
     let mut entry = 0;
     while entry < count {
@@ -308,20 +307,20 @@ pub const fn has_direct_rates(structure: &Structure) -> bool {
     count == structure.x.len()
 }
 
-/// A table of the structure that kernels go through, row by row.
+/// A table of the structure that kernels process row by row.
 #[derive(Clone, Copy)]
 pub enum StructureTable {
-    /// The terms of the Newton matrix, fill first.
+    /// The terms of the Newton matrix, fill-in first.
     Assembly,
-    /// Those of them that are fill.
+    /// The terms that are fill-in.
     Fill,
     /// Entries by which equations depend on kinematic states.
     Dependents,
-    /// States up to the last that is kinematic.
+    /// States up to the last kinematic one.
     Kinematic,
     /// Unknowns of a stage.
     Unknowns,
-    /// Entries of the Jacobian from the beginning of a block to that of another.
+    /// Entries of the Jacobian from the start of a block to the start of another.
     Entries(usize, usize),
 }
 
@@ -329,7 +328,7 @@ impl StructureTable {
     /// All entries of the Jacobian.
     pub const JACOBIAN: Self = Self::Entries(0, 5);
 
-    /// How many rows it has.
+    /// Returns the number of rows.
     #[inline(always)]
     pub const fn row_count(self, structure: &Structure) -> usize {
         let Structure { elimination, blocks, x, z, .. } = structure;
@@ -343,7 +342,7 @@ impl StructureTable {
         }
     }
 
-    /// How many it has where kernels are compiled for one model.
+    /// Returns the number of rows, if kernels are compiled for one model.
     pub const fn known_row_count<P: Plan>(self) -> Option<usize> {
         match P::KNOWN_STRUCTURE {
             Some(structure) => Some(self.row_count(structure)),
@@ -351,7 +350,7 @@ impl StructureTable {
         }
     }
 
-    /// Whether it may have any.
+    /// Whether the table may have rows.
     pub const fn may_have_rows<P: Plan>(self) -> bool {
         !matches!(self.known_row_count::<P>(), Some(0))
     }

@@ -1,16 +1,16 @@
-//! Structs as the numbers of an argument of a model.
+//! Structs as arguments of a model.
 
 use crate::scalar::Real;
 use crate::shape::Matrix;
 use bytemuck::Zeroable;
 use nalgebra::SMatrix;
 
-/// A struct that is an argument of a model, with its numbers in the order of the model:
-/// `#[derive(Record)]` writes it.
+/// A struct that is an argument of a model, converted to numbers in the order of the model;
+/// implemented by `#[derive(Record)]`.
 ///
-/// Fields are those that arguments may have: `f64`, arrays, tuples, fixed-size nalgebra vectors and
-/// matrices, and other records. The order is that of `STRUCTURE`: fields as they are declared,
-/// elements of arrays by index, matrices column after column.
+/// Fields are of the types of arguments: `f64`, arrays, tuples, fixed-size nalgebra vectors and
+/// matrices, and other records. The order is that of `STRUCTURE`: fields in the order of their
+/// declaration, elements of arrays by index, matrices in column-major order.
 ///
 /// # Example
 /// ```
@@ -39,17 +39,16 @@ use nalgebra::SMatrix;
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub trait Record: Sized {
-    /// How many numbers it has.
+    /// Number of numbers.
     const NUMBERS: usize;
 
-    /// Hands over its numbers, in order.
+    /// Writes the numbers in order.
     fn write(&self, to: &mut dyn FnMut(f64));
 
-    /// Is made of numbers, in order.
+    /// Reads the numbers in order.
     fn read(from: &mut dyn FnMut() -> f64) -> Self;
 
-    /// As a vector: `x0`, `u` or `p` of an integrator. That it has another length is found while
-    /// the program compiles.
+    /// Returns a vector: `x0`, `u` or `p` of an integrator. A wrong length is a compile-time error.
     #[must_use]
     fn to_vector<T: Real, V: Matrix<T>>(&self) -> V {
         const { assert!(Self::NUMBERS == V::ROWS * V::COLUMNS, "the record has as many numbers as the vector") };
@@ -63,21 +62,20 @@ pub trait Record: Sized {
         vector
     }
 
-    /// From a vector: a result of an integrator. That it has another length is found while the
-    /// program compiles.
+    /// Converts a vector: a result of an integrator. A wrong length is a compile-time error.
     #[must_use]
     fn from_vector<T: Real, V: Matrix<T>>(vector: &V) -> Self {
         const { assert!(Self::NUMBERS == V::ROWS * V::COLUMNS, "the record has as many numbers as the vector") };
         record_from_slice(vector.as_slice())
     }
 
-    /// From a slice: a stage of a solution. `None` if it has another length.
+    /// Converts a slice: a stage of a solution. `None` if the length is wrong.
     #[must_use]
     fn from_slice<T: Real>(values: &[T]) -> Option<Self> {
         (values.len() == Self::NUMBERS).then(|| record_from_slice(values))
     }
 
-    /// Its numbers, in order.
+    /// Returns the numbers in order.
     #[cfg(feature = "alloc")]
     #[must_use]
     fn numbers(&self) -> alloc::vec::Vec<f64> {
@@ -146,7 +144,7 @@ mod tests {
 
     type Nested = (f64, [Vector2<f64>; 2], Matrix2<f64>, (Vector1<f64>, [f64; 0]));
 
-    /// Integers, each at its place.
+    /// Each number is its position.
     #[test]
     fn order_of_numbers() {
         let value: Nested = (

@@ -1,6 +1,6 @@
-//! What the calls of an integrator return: nalgebra vectors and matrices of the model's dimensions.
+//! The results of integrators: nalgebra vectors and matrices of the model's dimensions.
 //!
-//! Every result contains the smaller ones and dereferences to them: `forward.x` is the end state
+//! Every result contains the smaller ones and dereferences to them: `forward.x` is the final state
 //! and `hessian.dx_du` the Jacobian of the same call.
 
 use crate::model::{
@@ -108,8 +108,7 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
     pub dz0: MatrixZC<M, T, C>,
 }
 
-/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`. By default all are
-/// zero.
+/// `C` directions `(δx₀, δu, δp)`, one per column: the argument of `directional`. Zero by default.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -138,7 +137,7 @@ pub struct Seeds<M: Dae, T: Plain, const C: usize> {
     pub p: MatrixPC<M, T, C>,
 }
 
-/// The solution and the gradients of `λᵀx` for each of `C` seeds `λ`, one a column.
+/// The solution and the gradients of `λᵀx` for `C` seeds `λ`, one per column.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -196,11 +195,11 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
     pub grad_p: VectorP<M, T>,
 }
 
-/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`; of `λᵀx + νᵀz0` where
-/// weights `ν` are given.
+/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`, or of `λᵀx + νᵀz0` with
+/// weights `ν`.
 ///
-/// The Hessian over `(x₀, u, p)` is symmetric to the last bit; of its blocks beside the diagonal
-/// the upper ones are given.
+/// The Hessian over `(x₀, u, p)` is bitwise symmetric; of its off-diagonal blocks the upper ones
+/// are stored.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -305,7 +304,7 @@ plain!([M: Dae, T: Plain] Hessian<M, T> { first, h_xx, h_xu, h_uu, h_xp, h_up, h
 plain!([M: Dae, T: Plain] Dense<M, T> { x, z });
 plain!([M: Dae, T: Plain] DenseForward<M, T> { dense, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
 
-/// Zeros: a place for a result.
+/// A result of zeros.
 macro_rules! zeros {
     ($($type:ident)*) => { $(
         impl<M: Dae, T: Plain> Default for $type<M, T> {
@@ -323,14 +322,14 @@ impl<M: Dae, T: Plain, const C: usize> Default for Adjoint<M, T, C> {
     }
 }
 
-/// No direction at all: the seeds that are wanted are set in it.
+/// Zero directions; set the seeds that are needed.
 impl<M: Dae, T: Plain, const C: usize> Default for Seeds<M, T, C> {
     fn default() -> Self {
         Self::zeroed()
     }
 }
 
-/// A result contains a smaller one.
+/// Dereferences a result to a smaller one that it contains.
 macro_rules! contains {
     ($outer:ident.$field:ident: $inner:ident, $($generics:tt)*) => {
         contains!(@ [$($generics)*] $outer $field $inner);
@@ -359,7 +358,7 @@ contains!(ForwardAdjoint.forward: Forward,);
 contains!(Hessian.first: ForwardAdjoint,);
 contains!(DenseForward.dense: Dense,);
 
-/// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
+/// Writes a row over the directions `(x₀, u, p)` to row `r` of three matrices.
 pub(crate) fn write_row<T: Plain>(
     row: &[T],
     r: usize,
@@ -385,7 +384,7 @@ fn write_matrix_row<'a, T: Plain, A: Matrix<T>>(
     }
 }
 
-/// A block on the diagonal, from its lower triangle.
+/// Writes a diagonal block from its lower triangle.
 pub(crate) fn write_symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(
     block: &mut A,
     lower: &[R],

@@ -1,4 +1,4 @@
-//! Dimensions of a model as types: what lets every array of the library live in static memory.
+//! Dimensions of a model as types, for arrays in static memory.
 //!
 //! Stable Rust has no `[T; M::NX]` in generic code. So the dimensions of a model are a type,
 //! [`Dims`], and [`Shape`] maps an element type to the arrays and matrices of these dimensions.
@@ -12,11 +12,11 @@ use core::fmt::Debug;
 use core::ops::{Deref, DerefMut, Index, IndexMut};
 use nalgebra::{SMatrix, SVector};
 
-/// An element of static memory: copied freely, and valid when all its bytes are zero.
+/// An element of static memory: `Copy`, and valid if all its bytes are zero.
 pub trait Plain: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static {}
 impl<T: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static> Plain for T {}
 
-/// `Copy` without the bounds of a derive.
+/// Implements `Copy` without the bounds of a derive.
 macro_rules! copy {
     ([$($generics:tt)*] $type:ty) => {
         impl<$($generics)*> Clone for $type {
@@ -30,8 +30,8 @@ macro_rules! copy {
 }
 pub(crate) use copy;
 
-/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
-/// on the parameters of the struct.
+/// Implements [`Plain`] for a struct of plain fields, without the bounds that a derive would put on
+/// its parameters.
 macro_rules! plain {
     ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
         crate::shape::copy!([$($generics)*] $type);
@@ -40,7 +40,7 @@ macro_rules! plain {
 }
 pub(crate) use plain;
 
-/// The same for a struct that has a list among its fields.
+/// The same for a struct with a list among its fields.
 #[cfg(feature = "alloc")]
 macro_rules! listed {
     ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
@@ -64,7 +64,7 @@ macro_rules! compared {
         }
         impl<$($generics)*> core::fmt::Debug for $type {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                // The name alone: `stringify` has the generic parameters too.
+                // The name only: `stringify` includes the generic parameters.
                 let name = stringify!($type);
                 f.debug_struct(name.split('<').next().unwrap_or(name).trim_end())$(.field(stringify!($field), &self.$field))*.finish()
             }
@@ -73,9 +73,8 @@ macro_rules! compared {
 }
 pub(crate) use compared;
 
-/// What begins where a line of the cache does on machines with wide registers: they are loaded in
-/// halves where they cross into the next line. Without `std` programs have what they were compiled
-/// for, and memory is laid out by others.
+/// Aligned to cache lines on machines with wide registers, where loads across cache lines are
+/// split. Only with `std`: other targets choose their memory layout.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 #[cfg_attr(all(target_arch = "x86_64", feature = "std"), repr(C, align(64)))]
 pub struct Aligned<V>(pub V);
@@ -95,19 +94,19 @@ impl<V> DerefMut for Aligned<V> {
     }
 }
 
-/// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
+/// `to = from` without a copy on the stack, which an assignment makes in unoptimised programs.
 #[inline(always)]
 pub(crate) fn copy_into<V: Copy>(to: &mut V, from: &V) {
     core::slice::from_mut(to).copy_from_slice(core::slice::from_ref(from));
 }
 
 mod sealed {
-    /// There is no other [`Array`](super::Array).
+    /// No other type implements [`Array`](super::Array).
     pub trait Sealed {}
     impl<T, const N: usize> Sealed for [T; N] {}
 }
 
-/// `[T; N]` of a length that the model knows.
+/// `[T; N]` with a length of the model.
 pub trait Array<T>:
     sealed::Sealed + Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]>
 {
@@ -115,13 +114,13 @@ pub trait Array<T>:
     const LEN: usize;
     /// `[f(0), f(1), ...]`
     fn from_fn(f: impl FnMut(usize) -> T) -> Self;
-    /// The elements of arrays, one array after the other.
+    /// The elements of all arrays in order.
     fn flat(arrays: &[Self]) -> &[T];
-    /// The elements of arrays, one array after the other.
+    /// The elements of all arrays in order.
     fn flat_mut(arrays: &mut [Self]) -> &mut [T];
-    /// `W` elements, from one on.
+    /// `W` elements from `begin` on.
     fn chunk<const W: usize>(&self, begin: usize) -> Option<&[T; W]>;
-    /// `W` elements, from one on.
+    /// `W` elements from `begin` on.
     fn chunk_mut<const W: usize>(&mut self, begin: usize) -> Option<&mut [T; W]>;
 }
 
@@ -161,24 +160,24 @@ impl<T: Plain, const N: usize> Array<T> for [T; N] {
     }
 }
 
-/// A nalgebra matrix or vector of dimensions that the model knows, column-major.
+/// A nalgebra matrix or vector with dimensions of the model, column-major.
 pub trait Matrix<T>: Plain + Index<(usize, usize), Output = T> + IndexMut<(usize, usize)> {
     /// The number of rows.
     const ROWS: usize;
     /// The number of columns.
     const COLUMNS: usize;
-    /// The elements, column after column.
+    /// The elements in column-major order.
     fn as_slice(&self) -> &[T];
-    /// The elements, column after column.
+    /// The elements in column-major order.
     fn as_mut_slice(&mut self) -> &mut [T];
 }
 
-/// An element whose place comes out of a table; zeroed if there is none.
+/// Returns an element whose indices come from a table; zero if it does not exist.
 pub(crate) fn entry<T: Plain, A: Matrix<T>>(matrix: &A, row: usize, column: usize) -> T {
     matrix.as_slice().get(row + column * A::ROWS).copied().unwrap_or_else(T::zeroed)
 }
 
-/// Changes an element whose place comes out of a table.
+/// Changes an element whose indices come from a table.
 pub(crate) fn update_entry<T: Plain, A: Matrix<T>>(
     matrix: &mut A,
     row: usize,
@@ -203,9 +202,9 @@ impl<T: Plain, const R: usize, const C: usize> Matrix<T> for SMatrix<T, R, C> {
     }
 }
 
-/// The dimensions of a model, and the arrays and matrices they give.
+/// The dimensions of a model, with their arrays and matrices.
 ///
-/// Three index sets occur everywhere:
+/// Three index sets are used everywhere:
 /// - unknowns of a stage `(k, z)`, length `NK = NX + NZ`: the rows and columns of the Newton
 ///   matrix;
 /// - variables of the model `(ẋ, x, z, u, p, t)`, length `NV = 2 NX + NZ + NU + NP + 1`;
@@ -237,11 +236,11 @@ pub trait Shape: 'static {
     const NP: usize;
     /// Unknowns of a stage: `NX + NZ`.
     const NK: usize;
-    /// Variables of the model, time included: `2 NX + NZ + NU + NP + 1`.
+    /// Variables of the model, including the time: `2 NX + NZ + NU + NP + 1`.
     const NV: usize;
     /// Directions of sensitivities: `NX + NU + NP`.
     const NW: usize;
-    /// Columns that there is memory for where directions are computed side by side, `NW` or more.
+    /// Columns of the memory for directions, `NW` or more.
     const NC: usize;
 
     /// `[T; NX]`

@@ -1,6 +1,6 @@
-//! What the last call did.
+//! Statistics of calls.
 
-/// What the last call did, successful or not.
+/// Statistics of the last call, successful or not.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -20,24 +20,25 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// Steps that were completed.
+    /// Number of completed steps.
     pub steps: usize,
-    /// Iterations of Newton's method, all steps together.
+    /// Number of Newton iterations in all steps.
     pub iterations: usize,
-    /// Evaluations of the residual alone at all stages; of an explicit method, of one stage.
+    /// Number of evaluations of the residual alone at all stages; for explicit methods at one
+    /// stage.
     pub residuals: usize,
-    /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the
-    /// Jacobian in their middle; of an explicit method, of one stage.
+    /// Number of evaluations of the residual and the Jacobian at all stages, or of the residual at
+    /// all stages and the Jacobian at their midpoint; for explicit methods at one stage.
     pub jacobians: usize,
-    /// Factorisations of the Newton matrix.
+    /// Number of factorisations of the Newton matrix.
     pub factorizations: usize,
-    /// Those of them in which the planned elimination was not good enough, so that the whole matrix
-    /// was pivoted.
+    /// Number of these factorisations with pivoting of the whole matrix, since the planned
+    /// elimination was too inaccurate.
     pub dense: usize,
 }
 
 impl Statistics {
-    /// What another call did.
+    /// Adds the statistics of another call.
     pub(crate) fn add(&mut self, other: &Self) {
         self.steps += other.steps;
         self.iterations += other.iterations;

@@ -1,5 +1,5 @@
-//! Tokens that are no model, and models with something wrong in them: expanded to errors at tokens,
-//! without a panic and in bounded time. All is drawn from seeds, so that a failure repeats.
+//! Random tokens and mutated models: they expand to errors at tokens, without a panic and in
+//! bounded time. All tests are seeded and reproducible.
 
 use super::expand;
 use crate::language::Form;
@@ -107,7 +107,7 @@ impl Source {
             }
             _ => {
                 let punctuation = PUNCTUATION.as_bytes()[self.below(PUNCTUATION.len())] as char;
-                // Alone, a quote is the beginning of a lifetime that never comes.
+                // A single quote alone is the start of an incomplete lifetime.
                 let spacing =
                     if self.below(2) == 0 || punctuation == '\'' { Spacing::Joint } else { Spacing::Alone };
                 Punct::new(punctuation, spacing).into()
@@ -119,7 +119,7 @@ impl Source {
         [Delimiter::Parenthesis, Delimiter::Brace, Delimiter::Bracket, Delimiter::None][self.below(4)]
     }
 
-    /// The tokens with one thing changed, at any depth.
+    /// The tokens with one random change, at any depth.
     fn mutate(&mut self, tokens: TokenStream) -> TokenStream {
         let mut list: Vec<TokenTree> = tokens.into_iter().collect();
         let groups: Vec<usize> =
@@ -146,10 +146,10 @@ impl Source {
     }
 }
 
-/// Longer than any of these takes in an unoptimised build on a busy machine.
+/// Time limit of an expansion in an unoptimised build on a busy machine.
 const MAX_EXPANSION_TIME: Duration = Duration::from_secs(20);
 
-/// Whether it is a model.
+/// Expands an item within the time limit; returns whether it is a model.
 fn expands_in_time(seed: u64, form: Form, attribute: TokenStream, item: TokenStream) -> bool {
     let (text, begin) = (format!("seed {seed}: #[{attribute}] {item}"), Instant::now());
     let outcome = catch_unwind(AssertUnwindSafe(|| expand(form, attribute, item).to_string()));
@@ -164,8 +164,7 @@ fn form(seed: u64) -> Form {
     if seed.is_multiple_of(2) { Form::Dae } else { Form::Ode }
 }
 
-/// What is mutated is a model to begin with, or the mutations would be rejected for other reasons
-/// than their own.
+/// The models are valid before mutation, so that the mutations cause the rejections.
 #[test]
 fn models_are_models() {
     for (index, model) in MODELS.iter().enumerate() {
@@ -182,7 +181,7 @@ fn random_tokens_expand() {
         let length = source.below(40);
         let mut item: TokenStream = (0..length).map(|_| source.token(3)).collect();
         if source.below(2) == 0 {
-            // At least it looks like a function.
+            // The item starts like a function.
             let begin: TokenStream = "fn f(x: [f64; 2], u: f64) -> [f64; 2]".parse().expect("tokens");
             item = begin.into_iter().chain([Group::new(Delimiter::Brace, item).into()]).collect();
         }
@@ -207,6 +206,6 @@ fn mutated_models() {
         }
         models += usize::from(expands_in_time(seed, form(seed), attribute, item));
     }
-    // Some mutations leave a model (57 of these seeds), and some do not.
+    // Some mutations leave a valid model (57 of these seeds), and some do not.
     assert!((20..3900).contains(&models), "{models}");
 }

@@ -1,8 +1,8 @@
 //! The attributes `#[dae]`, `#[ode]` and `#[function]`.
 //!
-//! The entry is these few lines; everything else is an ordinary library over `proc_macro2`:
-//! `language` executes the model function symbolically and yields a graph, `graph` differentiates
-//! it, `structure` finds out what can be known before it runs, `emit` writes Rust.
+//! This file is the entry; the rest is an ordinary library over `proc_macro2`: `language` executes
+//! the model function symbolically and returns a graph, `graph` differentiates it, `structure`
+//! analyses it at compile time, `emit` writes Rust.
 
 mod emit;
 mod graph;
@@ -15,8 +15,9 @@ mod fuzz;
 
 use proc_macro::TokenStream;
 
-/// Bytes of the stack that an expansion has; pages that nobody touches cost nothing. An unoptimised
-/// parser takes up to 23 kB for a level, and [`language::tokens::check`] bounds the levels.
+/// Stack size of the thread that expands a model, in bytes; untouched pages use no memory. An
+/// unoptimised parser takes up to 23 kB per nesting level; [`language::tokens::check`] limits the
+/// levels.
 const STACK: usize = 1 << 29;
 
 /// A differential-algebraic model `0 = f(ẋ, x, u, z, p, t)`.
@@ -32,26 +33,27 @@ const STACK: usize = 1 << 29;
 /// let irk = Irk::<Spring, RadauIIA<3>>::new(Options::default());
 /// ```
 ///
-/// Beside the function, which stays as it is, stands a type of its name in upper camel case.
+/// The attribute keeps the function and adds a type with its name in upper camel case.
 ///
-/// | arguments | by name, in any order, only those that there are |
+/// | arguments | identified by name, in any order; only those that the model has |
 /// | --- | --- |
 /// | `xdot`, `x`, `z`, `u`, `p`, `t` | derivatives, states, algebraic states, controls, parameters, time |
-/// | types | `f64`, arrays, tuples, nalgebra vectors and matrices, structs; as many results as there are `x` and `z` |
+/// | types | `f64`, arrays, tuples, nalgebra vectors and matrices, structs |
+/// | result | as many residuals as there are `x` and `z` |
 ///
-/// | attribute | |
+/// | attribute | meaning |
 /// | --- | --- |
-/// | `nominal(x = [900.0, 2e6], z = 0.1)` | typical values. Those of `z` are where Newton's method starts: of several roots they decide for one; without one it is zero, or the geometric mean of a range that zero is not in |
-/// | `range(z = 1e-3..=10.0)` | from where to where values may be |
-/// | `N = [3, 5]` | sizes of a model with const parameters |
-/// | `name = Type`, `crate = path` | another name of the type; where casados is |
-/// | `index_reduction`, with `(baumgarte = [2.0, 1.0])` or `(projection)` | constraints are differentiated until the model has index 1, and its invariants are a function |
+/// | `nominal(x = [900.0, 2e6], z = 0.1)` | typical values; those of `z` are the initial guess of Newton's method and select one of several roots (default: zero, or the geometric mean of a range without zero) |
+/// | `range(z = 1e-3..=10.0)` | range of admissible values |
+/// | `N = [3, 5]` | sizes for which a model with const parameters is generated |
+/// | `name = Type`, `crate = path` | another name of the type; path of casados |
+/// | `index_reduction`, with `(baumgarte = [2.0, 1.0])` or `(projection)` | differentiates constraints until the model has index 1, and adds a function that returns its invariants |
 ///
-/// On a `mod` it takes structs, constants and helper functions as well. The body may be any
-/// computation that can be unrolled while it compiles: loops, closures, iterators, generics, `if`
-/// and `match` on model variables. In `f64` the residual has the bits of the function, but
-/// structural zeros are zeros: `0.0 * y`, `0.0 / y` and `y - y` are dropped, whatever `y` is when
-/// it runs, NaN too. Conditions of the compiler (`#[cfg]`) are refused inside of a model.
+/// On a `mod` the attribute also reads structs, constants and helper functions. The body may be any
+/// computation that can be unrolled at compile time: loops, closures, iterators, generics, `if` and
+/// `match` on model variables. In `f64` the residual is bitwise equal to that of the function,
+/// except for structural zeros: `0.0 * y`, `0.0 / y` and `y - y` become zero, even if `y` is NaN at
+/// run time. `#[cfg]` inside of a model is an error.
 ///
 /// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
 /// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
@@ -74,8 +76,8 @@ pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
 /// let erk = Erk::<Pendulum, Rk4>::new(Options::default());
 /// ```
 ///
-/// What holds for [`macro@dae`] holds here, with the arguments `x`, `u`, `p`, `t` and a result for
-/// each state.
+/// The arguments are `x`, `u`, `p`, `t`, and the result is the derivative of each state. Everything
+/// else is as in [`macro@dae`].
 ///
 /// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
 /// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
@@ -84,8 +86,8 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Ode, attribute.into(), item.into()).into()
 }
 
-/// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a
-/// constraint.
+/// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event function, a cost or
+/// a constraint.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -98,8 +100,8 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
 /// let integral = Quadrature::<Energy>::new();
 /// ```
 ///
-/// It has the arguments of its model, those too that it does not use (`_u`), but no `xdot`, and
-/// fits to every model of the same dimensions. It is written in the language of [`macro@dae`].
+/// It has the arguments of its model, unused ones included (`_u`), without `xdot`, and applies to
+/// every model of the same dimensions. The body is written in the language of [`macro@dae`].
 ///
 /// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
 /// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
@@ -108,20 +110,21 @@ pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Function, attribute.into(), item.into()).into()
 }
 
-/// The trait `casados::Record`: a struct as the numbers of an argument of a model, in their order.
+/// Derives the trait `casados::Record`: the struct becomes an argument of a model, an array of its
+/// numbers in the order of the fields.
 #[proc_macro_derive(Record)]
 pub fn record(item: TokenStream) -> TokenStream {
     record::derive(item.into()).into()
 }
 
-/// The item as it was written and, beside it, its type or the errors: an editor stays alive on a
-/// model that is being written.
+/// Returns the item unchanged, followed by its type or by the errors: editors keep completing an
+/// unfinished model.
 fn expand(
     form: language::Form,
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
-    // What is long without brackets (sums, chains of methods, `else if`) nests in the syntax tree.
+    // Long sums, chains of methods and `else if` nest deeply in the syntax tree.
     stacker::grow(STACK, || expand_on_thread(form, attribute, item))
 }
 
@@ -132,7 +135,7 @@ fn expand_on_thread(
 ) -> proc_macro2::TokenStream {
     let checks = [language::tokens::check(&attribute), language::tokens::check(&item)];
     if let Some(error) = checks.into_iter().find_map(Result::err) {
-        // The compiler itself does not bear what is nested too deeply or too long.
+        // Items that are nested too deeply or too long overflow the compiler itself.
         return error.to_compile_error();
     }
     match language::dual::read(form, attribute.clone(), item.clone()) {

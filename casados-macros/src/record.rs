@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 use syn::{Data, DeriveInput, Error, Result, parse_quote};
 
-/// The implementation of `Record`, or what is wrong.
+/// The implementation of `Record`, or an error.
 pub fn derive(input: TokenStream) -> TokenStream {
     record_impl(input).unwrap_or_else(|error| error.to_compile_error())
 }

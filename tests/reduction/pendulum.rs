@@ -34,8 +34,9 @@ fn state_after(x0: Vector4<f64>, time: f64) -> (Vector4<f64>, f64) {
     (end.x, end.dx_dx0.abs().column_sum().amax())
 }
 
-/// `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / arithmetic_geometric_mean(1, cos(θ/2))`, from horizontal and from the bottom,
-/// where one coordinate of the constraint's derivative vanishes.
+/// The period is `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / arithmetic_geometric_mean(1, cos(θ/2))`, from
+/// rest at the angle `θ` and from the bottom, where one coordinate of the constraint's derivative
+/// vanishes.
 #[test]
 fn period_of_swings() {
     for angle in [PI / 2.0, 0.3, 2.5] {
@@ -53,7 +54,8 @@ fn period_of_swings() {
     }
 }
 
-/// From the top with the angular speed `ω` a turn takes `2π / arithmetic_geometric_mean(ω, √(ω² + 4g/l))`.
+/// From the top with the angular speed `ω` a turn takes
+/// `2π / arithmetic_geometric_mean(ω, √(ω² + 4g/l))`.
 #[test]
 fn period_of_turns() {
     for omega in [0.5f64, 4.0] {

@@ -1,20 +1,21 @@
-//! The branches that a model takes at a point: which conditions of `if`, `max` or `abs` hold there,
-//! and which pieces its tables have.
+//! The branches of a model at a point: the outcomes of the conditions of `if`, `max` or `abs`, and
+//! the pieces of its tables.
 
 use crate::model::{ArrayV, Dae};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
 
-/// How the model changes inside a step, the strongest change last.
+/// The change of branches within a step, in ascending order of strength.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BranchChange {
-    /// A spline changes its piece: no lower derivative jumps than its highest.
+    /// A spline knot: only the highest derivative of the spline jumps.
     SplineKnot,
-    /// The model changes its branch.
+    /// A switch between two branches of the model.
     Switch,
 }
 
-/// A number of the conditions and linear tables of a model, and one of its splines.
+/// One number that identifies the conditions and pieces of linear tables, and one that identifies
+/// the pieces of splines.
 #[derive(Clone, Copy, Debug, Default, Zeroable)]
 pub struct Branches {
     switch_code: f64,
@@ -22,7 +23,7 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// Those at a point.
+    /// The branches at a point.
     pub fn at_point<M: Dae, S: Lanes>(v: &ArrayV<M, S::Cell>) -> Self {
         let mut numbers = [S::Cell::zeroed(); 2];
         if const { M::BRANCHES > 0 } {
@@ -31,7 +32,7 @@ impl Branches {
         Self { switch_code: S::lane(&numbers[0], 0), knot_code: S::lane(&numbers[1], 0) }
     }
 
-    /// How the model changes in a step that has both.
+    /// The strongest change from `self` to `other`.
     pub fn change_to(self, other: Self) -> Option<BranchChange> {
         if self.switch_code != other.switch_code {
             Some(BranchChange::Switch)

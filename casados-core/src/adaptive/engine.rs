@@ -1,6 +1,6 @@
-//! What integrates with steps of variable size. Nobody outside can name it.
+//! The interface of all adaptive methods. Sealed: the traits cannot be named outside of the crate.
 
-use super::replay::{AcceptedStep, DynStepDifferentiator, StepDifferentiator};
+use super::replay::{DynStepDifferentiator, StepDifferentiator, StepRecord};
 use super::step::{AfterStep, Run, Span};
 use super::tape::TapeEntry;
 use crate::error::Error;
@@ -9,23 +9,22 @@ use crate::result::{Dense, Forward};
 use crate::scalar::Real;
 use core::marker::PhantomData;
 
-/// What a method remembers. Nobody outside can name it.
+/// The memory of a method. Cannot be named outside of the crate.
 pub trait MethodState<M: Dae, T: Real>: 'static {
-    /// Its memory.
+    /// The memory.
     type State: Default + Send + Sync;
 }
 
-/// What integrates with steps of variable size, for the models that it can.
+/// An adaptive method, for the models that it can integrate.
 pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
-    /// Whether `z` at the end of a step is that of a stage; else it is found from the
-    /// equations.
+    /// Whether `z` at the end of a step is the `z` of a stage; otherwise it is solved for.
     const ENDS_ON_STAGE: bool;
-    /// What takes its steps again.
+    /// Differentiates the accepted steps.
     type Differentiator: StepDifferentiator<M, T>;
     /// Integrates an interval; `after` is called after each accepted step.
     ///
     /// # Errors
-    /// Whatever ends a run early.
+    /// The error that ends the run.
     fn integrate(
         state: &mut Self::State,
         run: &mut Run<'_, M, T>,
@@ -33,8 +32,8 @@ pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
         span: Span<T>,
         after: AfterStep<'_, M, T>,
     ) -> Result<(), Error>;
-    /// The solution inside a step, from its numbers; `inputs` are variables of the model, of
-    /// which `u` and `p` count.
+    /// Dense output of a step from its numbers on the tape; of `inputs`, variables of the model,
+    /// `u` and `p` are used.
     ///
     /// # Errors
     /// A value of the model that is not finite.
@@ -46,11 +45,11 @@ pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
         t: T,
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error>;
-    /// What takes a step again.
-    fn replays(state: &mut Self::State) -> &mut Self::Differentiator;
+    /// The object that differentiates accepted steps.
+    fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator;
 }
 
-/// The steps of a method again, for derivatives that take part in the choice of its steps.
+/// Differentiates the steps of a method for error control of the sensitivities.
 pub struct MethodStepDifferentiator<M: Dae, B: Engine<M, T>, T: Real> {
     method_state: B::State,
     model: PhantomData<fn() -> (M, T)>,
@@ -63,8 +62,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Default for MethodStepDifferentiator<M, B
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> DynStepDifferentiator<M, T> for MethodStepDifferentiator<M, B, T> {
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error> {
-        B::replays(&mut self.method_state).forward(step, None)
+    fn forward(&mut self, step: &StepRecord<'_, M, T>) -> Result<&Forward<M, T>, Error> {
+        B::differentiator(&mut self.method_state).forward(step, None)
     }
 
     fn rate_derivatives(
@@ -73,6 +72,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> DynStepDifferentiator<M, T> for MethodSte
         weights: &[f64],
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        B::replays(&mut self.method_state).slopes(level, weights, to)
+        B::differentiator(&mut self.method_state).slopes(level, weights, to)
     }
 }

@@ -1,47 +1,46 @@
-//! The second estimate of the error of a step: what the linear part of the equations makes of the
-//! defect.
+//! The second error estimate: the defect of a step, filtered by a rational function of `hJ`.
 //!
-//! The polynomial `u` of a collocation step leaves the defect `u̇ − f(u) ≈ d ℓ(τ)` with `ℓ` zero at
-//! the nodes and one where `d` is looked at. By the formula of variation of constants the end of
-//! the step is wrong by
+//! The collocation polynomial `u` has the defect `u̇ − f(u) ≈ d ℓ(τ)`, where `ℓ` is zero at the
+//! nodes and one at the point at which `d` is evaluated. By the variation-of-constants formula the
+//! error at the end of the step is
 //!
 //! ```text
 //! h φ(hJ) d        φ(z) = ∫₀¹ exp(z (1 − τ)) ℓ(τ) dτ
 //! ```
 //!
-//! At small `z` that is of order `z^(s−1)`, which is why a tolerance may be taken for granted there
-//! that the estimate of order `s` does not reach; on the imaginary axis beyond it is `1/|z|` and no
-//! smaller than that estimate. So oscillations whose periods are not much longer than the steps,
-//! and components that are stiff, lose the order that other ones have: order reduction (A.
-//! Prothero, A. Robinson, Math. Comp. 28 (1974); E. Hairer, G. Wanner, Solving Ordinary
-//! Differential Equations II, section IV.15). In place of `φ` stands
+//! For small `z` this is of order `z^(s−1)`, which justifies the coarser tolerance of the first
+//! estimate, of order `s`. On the imaginary axis beyond, it is `1/|z|`, as large as that estimate.
+//! Oscillations with periods close to the step size, and stiff components, therefore suffer order
+//! reduction (A. Prothero, A. Robinson, Math. Comp. 28 (1974); E. Hairer, G. Wanner, Solving
+//! Ordinary Differential Equations II, section IV.15). The estimate replaces `φ` by
 //!
 //! ```text
 //! r(z) = q z^(s−1) / Q(z)        Q(z) = Π_i (1 − μ_i z) = 1 + … + q z^s
 //! ```
 //!
-//! with the eigenvalues `μ_i` of `A`: `1/z` at infinity; of Radau IIA methods twice `φ` at zero,
-//! and along the imaginary axis between 0.6 and 2 times. As `r(z) = Σ_i c_i / (1 − μ_i z)`, one
-//! solve with the factors that Newton's method has gives it. The same solve gives `r(z)/z²`: of an
-//! oscillation it points against the error, of a decay along it.
+//! with the eigenvalues `μ_i` of `A`. It is `1/z` at infinity; for Radau IIA methods twice `φ` at
+//! zero and 0.6 to 2 times `φ` on the imaginary axis. Since `r(z) = Σ_i c_i / (1 − μ_i z)`, one
+//! solve with the factors of Newton's method evaluates it. The same solve evaluates `r(z)/z²`,
+//! which has the opposite direction of the error for an oscillation and the same direction for a
+//! decay.
 
 use super::step_size::fractional_power;
 use super::tolerances::ORDER_REDUCTION_RATIO;
 use crate::linalg::{COMPLEX_PARTS, Complex};
 use crate::scalar::Scalar;
 
-/// Errors of components that decay are damped by the steps that follow: no more than one of them is
-/// there at a time, and it may be some tolerances.
+/// Weight of errors of decaying components: later steps damp them, so that at most one local error
+/// is present at a time, which may be a few tolerances.
 const DAMPED_ERROR_WEIGHT: f64 = 0.2;
-/// The errors of oscillations add up, over more steps the more accurate these are: from where the
-/// second estimate says little to where it says all, they count so often.
+/// Weights of errors of oscillations, which accumulate: for a second estimate with little weight
+/// (large tolerances) and with full weight. More accurate runs have more steps.
 const ACCUMULATION_FACTORS: [f64; 2] = [4.0, 12.0];
 
 /// A complex number.
 type ComplexNumber = Complex<f64, 2>;
 
-/// Sums over the states of errors relative to the tolerance that was asked for, and of `(hJ)⁻²`
-/// times them.
+/// Sums over the states of errors relative to the user's tolerance, and of `(hJ)⁻²` times these
+/// errors.
 #[derive(Default)]
 pub struct RelativeErrors {
     error_square_sum: f64,
@@ -51,7 +50,7 @@ pub struct RelativeErrors {
 }
 
 impl RelativeErrors {
-    /// An error, and what is `(hJ)⁻²` times it.
+    /// Adds an error and `(hJ)⁻²` times it.
     pub fn add(&mut self, error: f64, divided: f64) {
         self.error_square_sum += error * error;
         self.mixed_product_sum += error * divided;
@@ -60,18 +59,19 @@ impl RelativeErrors {
     }
 }
 
-/// The filter of a method, and how what it lets pass is judged.
+/// The defect filter of a method, with the weights of its result.
 #[derive(Clone, Copy, Debug)]
 pub struct DefectFilter {
-    /// `c`, as factors of the parts of a solution; and those of `r(z)/z²`.
+    /// The coefficients `c` of `r(z)`, and those of `r(z)/z²`, for the real and imaginary parts of
+    /// a solution.
     weights: [[f64; COMPLEX_PARTS]; 2],
-    /// The estimate of lower order behaves like this power of what is estimated here.
+    /// The lower-order estimate is proportional to this power of the second estimate.
     lower_order_exponent: f64,
 }
 
 impl DefectFilter {
-    /// From the eigenvalues of a method with so many stages; of complex conjugate ones there is
-    /// one, and a real one is the first.
+    /// The filter of a method with `stages` stages and the eigenvalues `values`: one of each
+    /// complex conjugate pair, a real one first.
     pub fn new(values: Complex<f64, COMPLEX_PARTS>, stages: usize) -> Self {
         let value = |l: usize| {
             let (re, im) = values.get(l);
@@ -96,10 +96,10 @@ impl DefectFilter {
             let z = one / own;
             let highest = (1..stages).fold(coefficient, |product, _| product * z);
             let twice = if lane < real { 1.0 } else { 2.0 };
-            // Of two stages there is no such: then everything is kept.
+            // With two stages `r(z)/z²` has a pole at zero; the errors then have full weight.
             let divided = if stages < 3 { highest.scaled(-1.0) } else { highest * own * own };
             for (weights, number) in weights.iter_mut().zip([highest, divided]) {
-                // The real part of a product.
+                // The real part of the product.
                 (weights[lane], weights[COMPLEX_PARTS / 2 + lane]) =
                     (twice * number.parts[0], -twice * number.parts[1]);
             }
@@ -108,13 +108,13 @@ impl DefectFilter {
         Self { weights, lower_order_exponent: (s + 1.0) / (2.0 * s) }
     }
 
-    /// Factors of the parts of a solution.
+    /// The coefficients for the parts of a solution.
     pub fn weights(&self) -> &[[f64; COMPLEX_PARTS]; 2] {
         &self.weights
     }
 
-    /// The estimate of lower order or, if that is larger, the power of this one that behaves like
-    /// it; the tolerance of the first is `tolerance_ratio` times the one that was asked for.
+    /// The lower-order estimate `first` or, if larger, the power of the second estimate with the
+    /// same order; `tolerance_ratio` is the ratio of the estimator tolerance and the user's.
     pub fn max_estimate(&self, first: f64, tolerance_ratio: f64, relative: &RelativeErrors) -> f64 {
         let RelativeErrors {
             error_square_sum: square,
@@ -122,13 +122,13 @@ impl DefectFilter {
             filtered_square_sum: divided_square,
             count,
         } = *relative;
-        // The square of the cosine between them, where they point against each other.
+        // The squared cosine of their angle, if they have opposite directions.
         let against = if product < 0.0 { product / square * (product / divided_square) } else { 0.0 };
         let needed = Scalar::powi((tolerance_ratio / ORDER_REDUCTION_RATIO).min(1.0), 4);
         let kept = ACCUMULATION_FACTORS[0] + (ACCUMULATION_FACTORS[1] - ACCUMULATION_FACTORS[0]) * needed;
         let share = needed * (DAMPED_ERROR_WEIGHT + (kept - DAMPED_ERROR_WEIGHT) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
-        // Written so that NaN stays.
+        // NaN is returned.
         if first.is_nan() || second <= first && second <= 1.0 {
             return first;
         }

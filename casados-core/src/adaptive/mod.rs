@@ -1,25 +1,27 @@
-//! Integration with steps of variable size, chosen so that the estimated error of each stays below
-//! a tolerance.
+//! Adaptive integration: step-size control by an estimate of the local error.
 //!
 //! Radau IIA methods for stiff and differential-algebraic equations, with one Jacobian for all
-//! stages and, for [`Radau`], a number of stages (3, 5 or 7: orders 5, 9 and 13) that follows from
-//! how Newton's method converges. The algorithm is that of the codes RADAU5 and RADAU (E. Hairer,
+//! stages; [`Radau`] selects the number of stages (3, 5 or 7: orders 5, 9 and 13) by the
+//! convergence of Newton's method. The algorithm is that of the codes RADAU5 and RADAU (E. Hairer,
 //! G. Wanner, Solving Ordinary Differential Equations II, section IV.8; Stiff differential
 //! equations solved by Radau methods, J. Comput. Appl. Math. 111 (1999)), for fully implicit
-//! equations. [`Gauss`] methods of orders 4 to 12, where oscillations are not to be damped, with an
-//! estimate of the same kind: how far the derivative of the polynomial, extrapolated to the end of
-//! the step, is from the solution there, through the matrix of one eigenvalue. Explicit pairs of
-//! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that are not stiff.
+//! equations. [`Gauss`] methods of orders 4 to 12, which do not damp oscillations, with a similar
+//! estimate: the difference between the derivative of the polynomial, extrapolated to the end of
+//! the step, and that of the solution, solved with the matrix of one eigenvalue. Explicit pairs of
+//! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit non-stiff models.
 //!
-//! From the bottom up: `options`, `statistics`, `point` and `tape` are data; `tolerances` what is
-//! asked of each part, `discontinuity` what is known of branches, `newton_monitor` how an iteration
-//! goes, `error_estimate` the second estimate, `step_size` the controllers and `pairs` the
-//! coefficients of explicit methods; `stages` and `replay` the traits of a step and of its
-//! derivatives; `order` the methods of a family and the choice among them; `consistent` derivatives
-//! at a point and `variational` errors of derivatives; `step` the loop over the steps of implicit
-//! methods, `engine` the trait of a method as a whole and `methods` all of them; `sensitivities`
-//! derivatives of runs, `integrator` what users see, `segment` one of several intervals,
-//! `piecewise` those with controls of their own, `events`, and `along` integrands.
+//! From the bottom up:
+//!
+//! - data: `options`, `statistics`, `point`, `tape`;
+//! - `tolerances`, `discontinuity` (branches), `newton_monitor` (convergence), `error_estimate`
+//!   (second estimate), `step_size` (controllers), `pairs` (coefficients of explicit methods);
+//! - `stages` and `replay`: the traits of a step and of its derivatives; `order`: the methods of a
+//!   family and order selection;
+//! - `consistent`: derivatives at a point; `variational`: error control of sensitivities;
+//! - `step`: the loop over the steps of implicit methods; `engine`: the trait of a method;
+//!   `methods`: all methods;
+//! - `sensitivities`: derivatives of runs; `integrator`: the public interface; `segment` and
+//!   `piecewise`: several intervals with their own controls; `events`; `quadrature`: integrands.
 
 mod consistent;
 mod discontinuity;
@@ -67,32 +69,32 @@ use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 /// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
 /// `Adaptive<Model, Radau>`.
 ///
-/// Steps are as long as the estimate of their error allows, weighted with `atol + rtol |x|`.
-/// Derivatives are those of the accepted steps. Methods are [`Radau`], of orders 5, 9 and 13 as it
-/// goes; one of `RadauIIA<3>`, `<5>`, `<7>`, `Gauss<2>` to `Gauss<6>`; and for explicit models
+/// The step size is controlled by an estimate of the local error, weighted with `atol + rtol |x|`.
+/// Derivatives are those of the accepted steps. Methods are [`Radau`], which selects among orders
+/// 5, 9 and 13; `RadauIIA<3>`, `<5>`, `<7>`, and `Gauss<2>` to `Gauss<6>`; and for explicit models
 /// `DormandPrince5` and `DormandPrince8`.
 ///
-/// It is an [`Integrator`], whose page has all that it can do:
+/// It is an [`Integrator`], whose page documents all calls:
 ///
-/// | | |
+/// | call | effect |
 /// | --- | --- |
 /// | [`new`](Integrator::new) | memory on the heap |
-/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, start values of `ẋ` and `z` |
-/// | [`set_relative_tolerances`](Integrator::set_relative_tolerances), [`set_absolute_tolerances`](Integrator::set_absolute_tolerances) | tolerances of single states |
-/// | [`control_sensitivities`](Integrator::control_sensitivities) | derivatives take part in the error control |
+/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, initial guess of `ẋ` and `z` |
+/// | [`set_relative_tolerances`](Integrator::set_relative_tolerances), [`set_absolute_tolerances`](Integrator::set_absolute_tolerances) | tolerances of individual states |
+/// | [`control_sensitivities`](Integrator::control_sensitivities) | error control of sensitivities |
 /// | [`solve`](Integrator::solve), [`solve_at`](Integrator::solve_at) | `x₊`, also with the solution at given times |
-/// | [`forward`](Integrator::forward) | and derivatives by `(x₀, u, p)` |
+/// | [`forward`](Integrator::forward) | and derivatives with respect to `(x₀, u, p)` |
 /// | [`adjoint`](Integrator::adjoint) | and gradients of `λᵀx₊` |
 /// | [`hessian`](Integrator::hessian) | and second derivatives |
-/// | [`dense`](Integrator::dense) | the solution inside the last interval |
-/// | [`freeze`](Integrator::freeze), [`thaw`](Integrator::thaw) | later calls take the same steps |
-/// | [`times`](Integrator::times), [`statistics`](Integrator::statistics) | the accepted steps, and what they took |
+/// | [`dense`](Integrator::dense) | the solution within the last interval |
+/// | [`freeze`](Integrator::freeze), [`thaw`](Integrator::thaw) | later calls repeat the same steps |
+/// | [`times`](Integrator::times), [`statistics`](Integrator::statistics) | the accepted steps, and their cost |
 ///
-/// By default six digits: [`AdaptiveOptions`]. Units are those of the model.
+/// The default relative tolerance is 1e-6; see [`AdaptiveOptions`]. Units are those of the model.
 ///
 /// # Errors
-/// Those of [`Integrator`]: no consistent start, steps that would have to be too short or too many,
-/// a model without a value, inputs that are not finite.
+/// Those of [`Integrator`]: inconsistent initial values, a step size below the minimum, too many
+/// steps, a model or inputs that are not finite.
 ///
 /// # Example
 /// ```
@@ -118,7 +120,7 @@ use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 /// ```
 pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 
-/// A method that an adaptive integrator takes.
+/// A method of an adaptive integrator.
 ///
 /// ```
 /// use casados::adaptive::AdaptiveMethod;
@@ -143,7 +145,7 @@ pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
             `DormandPrince5` and `DormandPrince8`"
 )]
 pub trait AdaptiveMethod {
-    /// Its integrator.
+    /// The integrator of the method.
     type Integrator<M: Dae, T: Real>;
 }
 

@@ -1,81 +1,79 @@
-//! Newton's method in a step: its rate, when it has converged, when it is given up and why.
+//! Convergence monitor of Newton's method in a step: contraction rate, convergence, divergence and
+//! failures.
 //!
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8.
 
 use super::discontinuity::Branches;
 use crate::scalar::Scalar;
 
-/// The Newton matrix is that of the last Jacobian, so that the iteration converges linearly. It is
-/// expected to take no more than this many iterations, and this many more with each stage above
-/// three.
+/// Expected number of iterations with three stages, and the number added for each further stage.
+/// Convergence is linear, since the matrix is that of the last Jacobian.
 const EXPECTED_ITERATIONS: f64 = 7.0;
 const ITERATIONS_PER_STAGE: f64 = 2.5;
 
-/// `THET` of RADAU5: an iteration with this rate, or that is over at once, keeps its Jacobian for
-/// the next step.
+/// `THET` of RADAU5: with a contraction rate up to this the Jacobian is reused in the next step.
 pub(super) const THET: f64 = 1e-3;
 
-/// Increments that shrink no more are rounding errors, if they are this small beside what is
-/// tolerated: of a state near zero that follows from large ones by an equation, they may be above
-/// the tolerance of the iteration.
+/// Increments below this part of the tolerance that no longer shrink are rounding errors. An
+/// equation with large terms can make those of a state near zero larger than Newton's tolerance.
 const ROUNDING_INCREMENT: f64 = 0.01;
 
-/// How an iteration ended that did not converge.
+/// The cause of a failed iteration.
 pub enum NewtonFailure {
-    /// It converges, but not soon enough: the factor by which a shorter step would.
+    /// The predicted number of iterations is too large; the factor for the step size.
     TooSlow(f64),
-    /// It does not converge.
+    /// The iteration diverges.
     Diverges,
-    /// The model has a value that is not finite.
+    /// A value of the model is not finite.
     NotFinite,
-    /// It converges slowly, with the Jacobian of an earlier step.
+    /// The iteration converges slowly with the Jacobian of an earlier step.
     StaleJacobian,
-    /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
+    /// A discontinuity within the step; the factor for the step size.
     Discontinuity(f64),
 }
 
-/// What keeps an iteration from converging.
+/// The equation and the unknown that prevent convergence.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FailureLocation {
     /// The unknown with the largest increment.
     pub unknown: usize,
-    /// The equation with the largest residual relative to its terms,
+    /// The equation with the largest residual relative to its terms.
     pub equation: usize,
-    /// and this residual.
+    /// This residual.
     pub residual: f64,
 }
 
-/// Where the stages are, beside borders between branches of the model.
+/// The stages relative to the switching surfaces of the model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SurfaceCrossing {
-    /// One has passed a border by the last increment.
+    /// A stage crossed a switching surface in the last increment.
     pub crossed_last: bool,
-    /// One is beyond a border from where the Jacobian was evaluated.
+    /// A stage is on another branch than the Jacobian.
     pub off_jacobian_branch: bool,
 }
 
-/// What is known about the convergence of the last iteration.
+/// The convergence of the last iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct NewtonMonitor {
-    /// How many iterations it took.
+    /// The number of iterations.
     pub iterations: usize,
-    /// How many it might have taken.
+    /// The maximum number of iterations.
     pub max_iterations: usize,
-    /// By what the increments shrank.
+    /// The contraction rate `θ` of the increments.
     pub contraction_rate: f64,
-    /// `θ/(1 − θ)`, which carries over to the next step.
+    /// `η = θ/(1 − θ)`, which carries over to the next step.
     pub eta: f64,
-    /// Whether the Jacobian was evaluated for this step, and not kept from an earlier one.
+    /// Whether the Jacobian was evaluated for this step.
     pub jacobian_is_current: bool,
-    /// The branches of the model where that was.
+    /// The branches of the model at the Jacobian's point.
     pub jacobian_branches: Branches,
-    /// Where the stages are now, and where they were before the last increment.
+    /// The stages relative to switching surfaces, now and before the last increment.
     crossings: [SurfaceCrossing; 2],
-    /// The length of this step,
+    /// The length of this step.
     step_size: f64,
-    /// and that of the last one whose rate was measured.
+    /// The length of the last step with a measured rate.
     measured_step_size: f64,
-    /// The last increment and the last rate.
+    /// The last increment and the last contraction rate.
     last_increment_and_rate: [f64; 2],
 }
 
@@ -98,10 +96,10 @@ impl Default for NewtonMonitor {
 }
 
 impl NewtonMonitor {
-    /// The factor where no step tells: an increment counts as what is left after it.
+    /// `η` without a measured rate: the error is estimated by the increment.
     pub(super) const UNKNOWN_ETA: f64 = 1.0;
 
-    /// Before an iteration for so many stages, in a step of this length.
+    /// Begins the iterations of a step with this number of stages and this length.
     pub(super) fn begin_iteration(&mut self, stages: usize, length: f64) {
         self.step_size = length;
         self.max_iterations = (EXPECTED_ITERATIONS + ITERATIONS_PER_STAGE * (stages as f64 - 3.0)) as usize;
@@ -111,16 +109,16 @@ impl NewtonMonitor {
         self.last_increment_and_rate = [0.0; 2];
     }
 
-    /// The stages were moved.
+    /// Records the position of the stages after an increment.
     pub(super) fn record_crossing(&mut self, to: SurfaceCrossing) {
         self.crossings = [to, self.crossings[0]];
     }
 
-    /// After an increment relative to what is tolerated: whether what is left is below the
-    /// tolerance.
+    /// Tests an increment, relative to the tolerances of the estimate: whether the predicted error
+    /// is below `tolerance`.
     ///
     /// # Errors
-    /// It does not converge, or not soon enough.
+    /// The iteration diverges, or is too slow.
     pub(super) fn check_increment(&mut self, increment: f64, tolerance: f64) -> Result<bool, NewtonFailure> {
         let (iteration, most, [last, last_rate]) =
             (self.iterations, self.max_iterations, self.last_increment_and_rate);
@@ -129,8 +127,8 @@ impl NewtonMonitor {
             && 2.0 * increment >= last
             && !self.crossings[0].off_jacobian_branch
         {
-            // So does what converges slowly with the Jacobian of an earlier step: the next one gets
-            // its own, too.
+            // Slow convergence with the Jacobian of an earlier step; the next step gets a new one,
+            // too.
             self.contraction_rate = 2.0 * THET;
             return if self.jacobian_is_current { Ok(true) } else { Err(NewtonFailure::StaleJacobian) };
         }
@@ -138,7 +136,7 @@ impl NewtonMonitor {
             let rate = increment / last;
             self.contraction_rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
             self.last_increment_and_rate[1] = rate;
-            // Written so that NaN, after an increment of zero, is no divergence.
+            // NaN, after an increment of zero, is no divergence.
             if self.contraction_rate >= 0.99 {
                 return Err(NewtonFailure::Diverges);
             }
@@ -158,15 +156,15 @@ impl NewtonMonitor {
         Ok(self.eta * increment <= tolerance)
     }
 
-    /// Whether another increment is to follow a small one: an exact matrix is that of one side of a
-    /// border, and a stage has just passed one.
+    /// Whether a further increment has to follow a small one: a stage has just crossed a switching
+    /// surface, beyond which the exact matrix differs.
     pub(super) fn needs_another_iteration(&self, exact: bool) -> bool {
         exact && self.crossings[0].crossed_last && self.iterations < self.max_iterations
     }
 
-    /// Whether it is known how fast the iteration converges, whose last increment is `small` or
-    /// not: the matrix is exact, or two increments were compared. The rate of an earlier step holds
-    /// on its side of a border, and for steps that are no longer: it grows with their length.
+    /// Whether the contraction rate is known: the matrix is exact, or two increments were compared,
+    /// or the rate of an earlier step applies. That rate grows with the step size and holds on one
+    /// side of a switching surface only. `small`: the last increment is below the tolerance.
     pub(super) fn is_rate_known(&self, exact: bool, small: bool) -> bool {
         let [now, before] = self.crossings;
         let here = !now.off_jacobian_branch && !before.off_jacobian_branch;
@@ -174,19 +172,19 @@ impl NewtonMonitor {
         exact || self.has_comparable_increments() || here && (self.iterations > 1 || known)
     }
 
-    /// Whether there are two increments that no border is between.
+    /// Whether there are two increments without a switching surface between them.
     fn has_comparable_increments(&self) -> bool {
         self.iterations > 1 && !self.crossings[1].crossed_last
     }
 
-    /// The iteration is over.
+    /// Ends the iterations of a step.
     pub(super) fn end_iteration(&mut self) {
         if self.has_comparable_increments() {
             self.measured_step_size = self.step_size;
         }
     }
 
-    /// The last increment was small, and has left this part of the residual.
+    /// Records the contraction rate that the residual has confirmed.
     pub(super) fn record_confirmed_rate(&mut self, rate: f64) {
         self.eta = self.eta.min(rate);
         self.measured_step_size = self.step_size;

@@ -1,14 +1,14 @@
-//! What can be chosen about an adaptive integrator.
+//! Options of an adaptive integrator.
 
 use crate::error::Error;
 use crate::scalar::Real;
 
-/// What can be chosen about an adaptive integrator.
+/// Options of an adaptive integrator.
 ///
-/// A later version may have more fields: write `..Default::default()`.
+/// Later versions may add fields: write `..Default::default()`.
 ///
 /// # Errors
-/// What makes no sense is [`Error::InvalidOption`] of the integrator that is made with it.
+/// Integrators return [`Error::InvalidOption`] for values out of range.
 ///
 /// # Example
 /// ```
@@ -26,31 +26,29 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptiveOptions {
-    /// Relative tolerance of the error of one step, between 10 ε of the number type and 1.
-    /// Default 1e-6.
+    /// Relative tolerance of the local error, between 10 ε of the number type and 1. Default 1e-6.
     pub rtol: f64,
-    /// Absolute tolerance of the error of one step, finite and above zero in the number type.
-    /// Default 1e-9.
+    /// Absolute tolerance of the local error, finite and positive in the number type. Default 1e-9.
     pub atol: f64,
-    /// The length of the first step, finite and above zero; chosen if it is `None`, the
-    /// default.
+    /// The size of the first step, finite and positive; `None`, the default, selects it
+    /// automatically.
     pub initial_step: Option<f64>,
-    /// No step is longer; above zero, infinite by default. After a long rest steps are long, and
-    /// all points at which the model is evaluated may lie beside a short pulse: give its length.
+    /// The maximum step size, positive; infinite by default. After a long rest steps are long, and
+    /// may pass a short pulse without an evaluation in it: set the duration of the pulse.
     pub max_step: f64,
-    /// A step that would have to be shorter is the error `StepSizeUnderflow`; between zero, the
+    /// The minimum step size; smaller steps are the error `StepSizeUnderflow`. Between zero, the
     /// default, and `max_step`.
     pub min_step: f64,
-    /// More steps than these, refused ones included, are the error `TooManySteps`; at least one.
-    /// Default 100,000.
+    /// The maximum number of steps, rejected ones included; more are the error `TooManySteps`. At
+    /// least one, default 100,000.
     pub max_steps: usize,
-    /// Whether steps are remembered: dense output over the whole interval and sensitivities need
-    /// them. Default true.
+    /// Whether accepted steps are recorded, for sensitivities and dense output over the whole
+    /// interval. Default true.
     pub keep_steps: bool,
 }
 
 impl Default for AdaptiveOptions {
-    /// Six digits, nine for values below `1e-3`; all steps are remembered.
+    /// Six digits, an absolute error of 1e-9 for values below `1e-3`; all steps are recorded.
     fn default() -> Self {
         Self {
             rtol: 1e-6,
@@ -64,13 +62,12 @@ impl Default for AdaptiveOptions {
     }
 }
 
-/// The smallest relative tolerance, in ε: below, rounding errors are taken for errors of the
-/// method.
+/// Minimum relative tolerance, in ε: below it rounding errors exceed the errors of the method.
 const MIN_RTOL_ROUNDOFFS: f64 = 10.0;
 
 impl AdaptiveOptions {
     /// # Errors
-    /// [`Error::InvalidOption`] for the first value that makes no sense with the number type.
+    /// [`Error::InvalidOption`] for the first value out of range for the number type.
     pub fn check<T: Real>(&self) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
         check_rtol::<T>(self.rtol)?;

@@ -1,4 +1,5 @@
-//! The order: methods of a family, opened when they are needed, and which of them is next.
+//! Order selection: the methods of a family, allocated on first use, and the choice of the next
+//! one.
 
 use super::newton_monitor::NewtonMonitor;
 use super::replay::StepDifferentiator;
@@ -11,46 +12,46 @@ use crate::scalar::Real;
 use crate::shape::Matrix;
 use alloc::boxed::Box;
 
-/// The number of stages grows where Newton's method converges at this rate or faster,
+/// The number of stages increases up to this contraction rate of Newton's method.
 const FAST_CONTRACTION_RATE: f64 = 0.01;
-/// and falls where it converges at this rate or slower,
+/// The number of stages decreases from this contraction rate.
 const SLOW_CONTRACTION_RATE: f64 = 0.8;
-/// but grows only if the step size hardly changes,
+/// The number of stages increases only if the ratio of step sizes is in this range.
 const STEADY_STEP_RATIO: (f64, f64) = (0.8, 1.2);
-/// and not before so many steps have been taken with it.
+/// Minimum number of steps before the number of stages increases.
 const MIN_STEPS_BEFORE_INCREASE: usize = 5;
 
-/// The methods that an integrator may change between.
+/// The methods among which an integrator selects.
 pub trait MethodFamily: 'static {
-    /// How many.
+    /// The number of methods.
     const ORDER_COUNT: usize;
     /// See [`Engine`].
     const ENDS_ON_STAGE: bool;
-    /// What takes their steps again.
+    /// Differentiates the steps of the methods.
     type Differentiator<M: Dae, T: Real>: StepDifferentiator<M, T> + Default + Send + Sync;
-    /// One of them.
+    /// Creates the method of a level.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn StageSolver<M, T> + Send + Sync>, Error>;
 }
 
-/// The number of stages, and what speaks for another one.
+/// The number of stages, and the criteria for its change.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OrderSelection {
     pub order_index: usize,
-    /// How fast Newton's method converged.
+    /// The contraction rate of Newton's method.
     contraction_rate: f64,
-    /// How many steps were taken with it.
+    /// The number of steps with the present order.
     steps_with_order: usize,
-    /// Whether an iteration did not converge, or a matrix was singular,
+    /// Whether an iteration did not converge, or a matrix was singular.
     pub iteration_failed: bool,
-    /// or converged only with a much shorter step.
+    /// Whether a slow iteration reduced the step to half or less.
     pub step_was_halved: bool,
 }
 
 impl OrderSelection {
-    /// The level for the next matrix, for a step that is `ratio` times as long as the last one.
+    /// The level for the next matrix, of a step that is `ratio` times as long as the last one.
     pub fn select_order(&mut self, convergence: &NewtonMonitor, ratio: f64, levels: usize) -> usize {
         self.steps_with_order += 1;
         self.contraction_rate = convergence.contraction_rate.max(0.5 * self.contraction_rate).min(10.0);
@@ -68,8 +69,8 @@ impl OrderSelection {
         }
     }
 
-    /// Counts a step with the matrix of the last one; whether the number of stages is worth a new
-    /// matrix instead.
+    /// Counts a step with the matrix of the last one; returns whether a higher order justifies a
+    /// new matrix.
     pub fn may_increase_order(&mut self, levels: usize) -> bool {
         self.steps_with_order += 1;
         self.steps_with_order >= MIN_STEPS_BEFORE_INCREASE && self.order_index + 1 < levels
@@ -80,7 +81,7 @@ impl OrderSelection {
     }
 }
 
-/// The levels of a family that are in use.
+/// The allocated methods of a family.
 pub struct Orders<M: Dae, T: Real> {
     methods: [Option<Box<dyn StageSolver<M, T> + Send + Sync>>; 3],
 }
@@ -104,7 +105,7 @@ impl<M: Dae, T: Real> Orders<M, T> {
         }
     }
 
-    /// The last accepted step of one level becomes that of another.
+    /// Converts the last accepted step of one level to another.
     pub fn transfer_last_step<B: MethodFamily>(&mut self, from: usize, to: usize) -> Result<(), Error> {
         self.get::<B>(from)?;
         self.get::<B>(to)?;
@@ -123,14 +124,13 @@ impl<M: Dae, T: Real> Orders<M, T> {
     }
 }
 
-/// `Σ_i weight_i y_i`, a loop of its own, which is not unrolled.
+/// `Σ_i weight_i y_i`; a separate loop, which is not unrolled.
 #[inline(never)]
 pub(super) fn weighted_sum<T: Real>(weights: &[f64], y: &[T]) -> T {
     weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
 }
 
-/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`,
-/// `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+/// Dense output of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
 ///
 /// # Errors
 /// [`Error::Overflow`]

@@ -1,5 +1,5 @@
-//! Explicit pairs: two methods on the same stages, whose difference estimates the error, and their
-//! dense output.
+//! Explicit pairs: two methods with the same stages, whose difference estimates the error, and
+//! their dense output.
 //!
 //! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5,
 //! II.6 and II.10; the coefficients of the codes DOPRI5 and DOP853.
@@ -8,19 +8,20 @@ use crate::adaptive::step_size::PiParameters;
 use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 
-/// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the
-/// end of the step.
+/// The coefficients of a pair with `S` stages besides its tableau. One more stage, at the end of
+/// the step, follows.
 pub trait EmbeddedPair<const S: usize>: Method<S> {
-    /// The difference to the other method: of the stages, and of the one at the end.
+    /// The coefficients `e` of the difference of the two methods: of the stages, and of the stage
+    /// at the end.
     const ERROR_COEFFICIENTS: ([f64; S], f64);
-    /// The difference to a third one of low order: the estimate is then that of higher order, as
-    /// far as the two agree.
+    /// The coefficients of the difference to a third method, of order three; see
+    /// [`combined_estimate`](Self::combined_estimate).
     const THIRD_ORDER: Option<[f64; S]>;
-    /// How often the error counts of what is not damped.
+    /// The factor for undamped errors, which accumulate.
     const GLOBAL_ERROR_FACTOR: GlobalErrorFactor;
-    /// Steps are at the bound of stability where `h |J d|/|d|` is this much, on the real axis.
+    /// The stability bound on the negative real axis, for `h |J d|/|d|`.
     const STABILITY_BOUND: f64;
-    /// `b` less the coefficients of the last stage, which is at the end of the step.
+    /// `b` minus the coefficients of the last stage, which is at the end of the step.
     const FSAL_DIFFERENCE: [f64; S] = {
         let mut last = *Self::TABLEAU.b();
         let (mut column, row) = (0, &Self::TABLEAU.a()[S - 1]);
@@ -30,16 +31,17 @@ pub trait EmbeddedPair<const S: usize>: Method<S> {
         }
         last
     };
-    /// How the step size follows the error.
+    /// The step-size controller.
     const CONTROL: PiParameters;
-    /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one
-    /// at the end and of the ones before it.
+    /// Further stages for dense output: their nodes, and their coefficients of the stages, of the
+    /// stage at the end and of the preceding further stages.
     const DENSE_STAGES: &'static [DenseStage<S>];
-    /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end,
-    /// of those above.
+    /// The coefficients of the interpolation polynomial beyond degree three: of the stages, of the
+    /// stage at the end, and of the further stages.
     const DENSE_POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
 
-    /// The estimate from the two differences; what is not finite stays so.
+    /// The error estimate `d₅² / √(d₅² + 0.01 d₃²)` from the two differences; non-finite values are
+    /// returned.
     fn combined_estimate(fine: f64, coarse: Option<f64>) -> f64 {
         let Some(coarse) = coarse else { return fine };
         let both = fine * fine + 0.01 * coarse * coarse;
@@ -47,38 +49,37 @@ pub trait EmbeddedPair<const S: usize>: Method<S> {
     }
 }
 
-/// How often the error of a step counts that nothing damps: it is there at the end, together with
-/// those of all other steps.
+/// The global error factor: undamped local errors of all steps accumulate until the end.
 #[derive(Clone, Copy, Debug)]
 pub struct GlobalErrorFactor {
-    /// Once for so many steps of this length as the interval has,
+    /// The factor increases by one for this number of steps of the present length in the interval.
     pub steps_per_unit: f64,
-    /// but no more often than the first number; in long intervals, than up to the second one:
+    /// The range of the maximum factor: for short intervals, and for long ones.
     pub max_factor: (f64, f64),
-    /// once for so many steps of a run with a tolerance of one, whatever the tolerance is. Over an
-    /// oscillation, errors of a step in tolerances add up to the same at every tolerance, since
-    /// the error is of one order more than the estimate.
+    /// The maximum factor increases by one for this number of steps of a run with tolerance one.
+    /// Over an oscillation, local errors accumulate to the same number of tolerances at every
+    /// tolerance, since the error has a higher order than the estimate.
     pub unit_steps: f64,
 }
 
 impl GlobalErrorFactor {
-    /// In an interval of so many steps, each `unit` times as long as with a tolerance of one; once
-    /// at least.
+    /// The factor, at least one, for an interval of `steps` steps, each `unit` times as long as
+    /// with a tolerance of one.
     pub fn evaluate(&self, steps: f64, unit: f64) -> f64 {
         let most = (steps * unit / self.unit_steps).clamp(self.max_factor.0, self.max_factor.1);
         (steps / self.steps_per_unit).min(most).max(1.0)
     }
 }
 
-/// A stage for dense output.
+/// A further stage for dense output.
 pub struct DenseStage<const S: usize> {
-    /// `c`
+    /// The node `c`.
     pub node: f64,
-    /// Of the stages.
+    /// The coefficients of the stages.
     pub stages: [f64; S],
-    /// Of the one at the end.
+    /// The coefficient of the stage at the end.
     pub end_coefficient: f64,
-    /// Of the stages for dense output before it.
+    /// The coefficients of the preceding further stages.
     pub dense_coefficients: [f64; 2],
 }
 
@@ -142,7 +143,7 @@ impl EmbeddedPair<12> for DormandPrince8 {
     const GLOBAL_ERROR_FACTOR: GlobalErrorFactor =
         GlobalErrorFactor { steps_per_unit: 10.0, max_factor: (16.0, 40.0), unit_steps: 40.0 };
     const STABILITY_BOUND: f64 = 6.1;
-    // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
+    // For a constant step size the error is `0.965^(1/0.0375) = 0.39`.
     const CONTROL: PiParameters = PiParameters {
         order: 8.0,
         beta: 0.05,
@@ -290,7 +291,8 @@ impl EmbeddedPair<12> for DormandPrince8 {
 mod tests {
     use super::*;
 
-    /// Over more oscillations errors count more often, over as many with more steps as often.
+    /// The factor grows with the number of oscillations, and is independent of the steps per
+    /// oscillation.
     #[test]
     fn global_error_factor_of_long_intervals() {
         let factor = <DormandPrince8 as EmbeddedPair<12>>::GLOBAL_ERROR_FACTOR;

@@ -1,4 +1,4 @@
-//! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
+//! Integrals along an adaptive integration; see [`quadrature`](crate::quadrature).
 
 use super::engine::Engine;
 use super::events::{Hybrid, HybridAdjoint, HybridForward, Solution};
@@ -12,11 +12,11 @@ use crate::result::Nominal;
 use crate::scalar::Real;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
+    /// Adds an integrand: the value and the derivatives of `∫ l(x, z, u, p, t) dt`, together with
     /// those of the solution; see [`quadrature`](crate::quadrature).
     ///
-    /// The steps are chosen for the states, then taken again to rounding: value and derivatives
-    /// belong to each other.
+    /// The states determine the steps, which are then replayed and solved to rounding: the
+    /// derivatives are those of the value.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -26,9 +26,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
-    /// Takes an integrand along, for its integral over all intervals and its derivatives with those
-    /// of the solution; see [`quadrature`](crate::quadrature). Derivatives by all controls are
-    /// returned, and those in the integrand are zero.
+    /// Adds an integrand: its integral over all intervals and its derivatives, together with those
+    /// of the solution; see [`quadrature`](crate::quadrature). The derivatives with respect to all
+    /// controls are returned; those within the integrand are zero.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -38,7 +38,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
 }
 
 impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piecewise<M, B, T>, Q> {
-    /// See [`Piecewise::solve`]; the integral over all intervals.
+    /// As [`Piecewise::solve`]; computes the integral over all intervals.
     ///
     /// # Errors
     /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
@@ -51,7 +51,8 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         self.integrator.solve_with_quadrature(x0, controls, ends, Some(self.integrand))
     }
 
-    /// See [`Piecewise::forward`]; the integral over all intervals, and its derivatives.
+    /// As [`Piecewise::forward`]; computes the integral over all intervals, and returns its
+    /// derivatives.
     ///
     /// # Errors
     /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
@@ -67,8 +68,8 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         self.integrator.forward_with_quadrature(x0, controls, ends, self.integrand)
     }
 
-    /// See [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end and the
-    /// integral over all intervals. The integral and its derivatives.
+    /// As [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end plus the
+    /// integral over all intervals. Also returns the derivatives of the integral.
     ///
     /// # Errors
     /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
@@ -85,7 +86,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         self.integrator.hessian_with_quadrature(x0, controls, ends, lambda, self.integrand)
     }
 
-    /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over
+    /// As [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end plus the integral over
     /// all intervals.
     ///
     /// # Errors
@@ -102,11 +103,11 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Takes an integrand along, up to the end and over all events, where it may jump with the
-    /// state; see [`quadrature`](crate::quadrature).
+    /// Adds an integrand, up to the end and across all events, at which it may jump with the state;
+    /// see [`quadrature`](crate::quadrature).
     ///
-    /// At events derivatives are those of the solution, as those of the state: what is integrated
-    /// before the event, less what is after it, times the derivative of its time.
+    /// At events derivatives are those of the solution, as for the state: the integrand before the
+    /// event, minus the integrand after it, times the derivative of its time.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -116,7 +117,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 }
 
 impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybrid<M, B, T>, Q> {
-    /// See [`Hybrid::solve`]; the integral.
+    /// As [`Hybrid::solve`]; computes the integral.
     ///
     /// # Errors
     /// See [`Hybrid`]; [`Error::Grazing`].
@@ -124,7 +125,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
         self.integrator.solve_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
-    /// See [`Hybrid::forward`]; the integral and its derivatives.
+    /// As [`Hybrid::forward`]; computes the integral and its derivatives.
     ///
     /// # Errors
     /// See [`Hybrid`].
@@ -132,7 +133,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
         self.integrator.forward_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
-    /// See [`Hybrid::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    /// As [`Hybrid::adjoint`]; the gradient is that of `λᵀx` plus the integral.
     ///
     /// # Errors
     /// See [`Hybrid`].

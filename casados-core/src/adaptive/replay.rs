@@ -1,8 +1,7 @@
-//! A step that is known is taken again, to rounding, and differentiated: it is an interval of one
-//! step for the integrator with steps of equal size.
+//! Replay of an accepted step, solved to rounding, and its derivatives: an interval of one step for
+//! the fixed-step integrator.
 //!
-//! Nothing here is called through a table of functions: a program contains the derivatives that it
-//! asks for, and no others.
+//! Calls are statically dispatched: a program contains only the derivatives that it uses.
 
 use super::point::ModelPoint;
 use crate::error::Error;
@@ -19,43 +18,43 @@ use crate::shape::Shape;
 use crate::tableau::Method;
 use alloc::boxed::Box;
 
-/// A step that was taken.
-pub struct AcceptedStep<'a, M: Dae, T: Real> {
-    /// Its start.
+/// An accepted step.
+pub struct StepRecord<'a, M: Dae, T: Real> {
+    /// The start of the step.
     pub start: ModelPoint<'a, M, T>,
-    /// Its length.
+    /// The length of the step.
     pub h: T,
-    /// The unknowns of its stages, or values near them.
+    /// The unknowns of its stages, or an initial guess of them.
     pub stage_unknowns: &'a [T],
-    /// Which method of the family took it.
+    /// The index of its method in the family.
     pub order_index: usize,
-    /// Whether these values are those of the step but for their last digits: then the step is
-    /// differentiated at them where Newton's method leads away, and never fails to converge.
+    /// Whether the unknowns are those of the step, up to rounding: the step is then differentiated
+    /// at them if Newton's method converges elsewhere, and differentiation never fails to converge.
     pub stages_are_solved: bool,
 }
 
-/// Takes steps of given size.
+/// Differentiates steps of given size.
 pub trait StepDifferentiator<M: Dae, T: Real> {
-    /// The solution.
+    /// Solves the step.
     ///
     /// # Errors
     /// Those of Newton's method.
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error>;
-    /// The same with derivatives.
+    /// Solves the step and computes its derivatives.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix.
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
-    /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for
-    /// each direction.
+    /// The derivatives of `Σ_i weight_i k_i` of the last differentiated step with respect to
+    /// `(x_n, u, p)`, one row for each direction.
     ///
     /// # Errors
     /// [`Error::NoResult`]
@@ -65,13 +64,13 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
         weights: &[f64],
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error>;
-    /// The same with second derivatives of `λᵀx` at its end.
+    /// Solves the step and computes its derivatives and the second derivatives of `λᵀx` at its end.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix.
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
@@ -81,23 +80,22 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>;
-    /// The unknowns of the stages that a method of the family found last.
+    /// The unknowns of the stages of the last step of a method of the family.
     ///
     /// # Errors
     /// [`Error::NoResult`]
     fn stages(&mut self, level: usize) -> Result<&[T], Error>;
 }
 
-/// What differentiates a step, whatever the method is: a program that does not ask for it contains
-/// none of it.
+/// Differentiates a step of any method; programs that do not use it do not contain it.
 pub trait DynStepDifferentiator<M: Dae, T: Real>: Send + Sync {
     /// # Errors
     /// Those of Newton's method; a singular matrix.
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
+    fn forward(&mut self, step: &StepRecord<'_, M, T>) -> Result<&Forward<M, T>, Error>;
     /// # Errors
     /// [`Error::NoResult`]
     fn rate_derivatives(
@@ -108,10 +106,10 @@ pub trait DynStepDifferentiator<M: Dae, T: Real>: Send + Sync {
     ) -> Result<(), Error>;
 }
 
-/// The integrator of one step.
+/// The integrator of a single step.
 type OneStepIntegrator<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
 
-/// That of the method `B` with `S` stages, from its first call on.
+/// The single-step integrator of the method `B` with `S` stages, created by the first call.
 pub struct OneMethod<M: Dae, B, T: Real, const S: usize>(Option<Box<OneStepIntegrator<M, B, T, S>>>);
 
 impl<M: Dae, B, T: Real, const S: usize> Default for OneMethod<M, B, T, S> {
@@ -121,10 +119,10 @@ impl<M: Dae, B, T: Real, const S: usize> Default for OneMethod<M, B, T, S> {
 }
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
-    /// At the start of a step.
+    /// Prepares the integrator at the start of a step.
     fn prepare_step(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
     ) -> Result<&mut OneStepIntegrator<M, B, T, S>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
@@ -146,7 +144,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for OneMethod<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.prepare_step(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -154,7 +152,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.prepare_step(step)?.forward_refined(step.start.x, step.start.u, step.h, integrand)
@@ -162,7 +160,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -178,7 +176,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -200,11 +198,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
     }
 }
 
-/// A family of three.
+/// A family of three methods.
 #[derive(Default)]
 pub struct ThreeMethods<A, B, C>(A, B, C);
 
-/// What the method of a level does.
+/// Calls the method of a level.
 macro_rules! of_level {
     ($three:ident, $level:expr, $name:ident($($argument:expr),*)) => {
         match $level {
@@ -220,7 +218,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         of_level!(self, step.order_index, solve(step, integrand))
@@ -228,7 +226,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         of_level!(self, step.order_index, forward(step, integrand))
@@ -236,7 +234,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -245,7 +243,7 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {

@@ -1,4 +1,4 @@
-//! The steps of one of several intervals that follow each other.
+//! The steps of one of several successive intervals.
 
 use super::engine::Engine;
 use super::integrator::{Integrator, is_inside_interval};
@@ -18,18 +18,18 @@ use bytemuck::Zeroable;
 /// The steps of one interval.
 pub(super) struct Segment<M: Dae, T: Real> {
     pub tape: Tape<T>,
-    /// See [`Frozen::chosen`].
+    /// See `RecordedSteps::steps_were_chosen`.
     pub steps_were_chosen: bool,
     pub span: Span<T>,
-    /// That of steps that are kept, where these are stretched.
+    /// The interval of the frozen steps, before they are scaled.
     pub frozen_span: Span<T>,
     pub u: VectorU<M, T>,
     pub x: VectorX<M, T>,
-    /// Start values of `(ẋ, z)`.
+    /// Initial guess of `(ẋ, z)`.
     pub start_guess: ArrayK<M, T>,
-    /// Derivatives at the start of each step.
+    /// Sensitivities at the start of each step.
     pub step_sensitivities: Vec<T>,
-    /// `V_k`, row after row.
+    /// `V_k`, row by row.
     pub start_sensitivities: Vec<T>,
 }
 
@@ -50,7 +50,7 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
 }
 
 impl<M: Dae, T: Real> Segment<M, T> {
-    /// The steps of this interval, to be taken again and differentiated; `V_k`.
+    /// The steps of this interval, to be replayed and differentiated, and `V_k`.
     #[allow(clippy::type_complexity)]
     pub fn load<'a, B: Engine<M, T>>(
         &'a mut self,
@@ -82,7 +82,7 @@ impl<M: Dae, T: Real> Segment<M, T> {
     }
 }
 
-/// One more.
+/// Adds a segment.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]
@@ -90,7 +90,7 @@ pub(super) fn push_segment<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -
     push(segments, Segment::default())
 }
 
-/// The solution at a time inside the intervals; where two of them meet, that of the first.
+/// The solution at a time within the intervals; where two intervals meet, that of the first one.
 ///
 /// # Errors
 /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
@@ -110,7 +110,7 @@ pub(super) fn dense_at<'a, M: Dae, B: Engine<M, T>, T: Real>(
     let segment = segments.iter_mut().find(holds);
     let segment = segment.ok_or(outside)?;
     if segment.tape.entries().is_empty() {
-        // An interval without length; `z` there is that of the end, if all are.
+        // An interval of length zero; if all are, `z` is that of the end.
         (integrator.workspace.dense.x, integrator.workspace.dense.z) = (segment.x, end.z);
         return Ok(&integrator.workspace.dense);
     }
@@ -131,7 +131,7 @@ pub(super) fn filled_vec<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Err
     Ok(list)
 }
 
-/// A list that is there becomes one of this length: it does not allocate if it was ever as long.
+/// Resizes and fills a list; it allocates only if the list grows beyond its capacity.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]

@@ -1,4 +1,4 @@
-//! What a run asks of a step with any number of stages.
+//! The interface of a step with any number of stages.
 
 use super::discontinuity::BranchChange;
 use super::error_estimate::DefectFilter;
@@ -7,58 +7,58 @@ use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// The most stages.
+/// The maximum number of stages.
 pub(super) const MAX_STAGES: usize = 9;
 
-/// Where a step begins and what it is measured by.
+/// The start of a step, and its tolerances.
 pub struct StepContext<'a, M: Dae, T: Real> {
-    /// The variables at its start: a solution of the equations.
+    /// The variables at the start of the step: a solution of the equations.
     pub start_point: &'a ArrayV<M, T>,
-    /// Reciprocals of the tolerated errors of `(x, z)`, as the estimate of lower order needs them,
+    /// Reciprocals of the estimator tolerances of `(x, z)`.
     pub estimator_scale: &'a ArrayK<M, T>,
-    /// and how many times as large those of the tolerances are that were asked for.
+    /// Ratios of the estimator tolerances and the user's tolerances.
     pub user_ratio: &'a ArrayK<M, T>,
-    /// The largest of these factors.
+    /// The largest of these ratios.
     pub tolerance_ratio: f64,
-    /// Whether `ẋ` and `z` there are those of a stage of the step before.
+    /// Whether `ẋ` and `z` at the start are those of a stage of the preceding step.
     pub derivatives_are_known: bool,
-    /// Its length.
+    /// The length of the step.
     pub h: T,
 }
 
-/// An error of the states, and `(hJ)⁻²` times it.
+/// The filtered defect of the states, and `(hJ)⁻²` times it.
 pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
 
 /// A step with any number of stages.
 pub trait StageSolver<M: Dae, T: Real> {
-    /// How many.
+    /// The number of stages.
     fn stage_count(&self) -> usize;
-    /// Factors of the Newton matrix; whether those of the plan hold.
+    /// Factorises the Newton matrix; returns whether the planned pivots hold.
     ///
     /// # Errors
-    /// The unknown for which there is no pivot.
+    /// The unknown without a pivot.
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize>;
-    /// What kept the last iteration from converging, with the terms of each equation at the start
-    /// of the step.
+    /// The equation and unknown that prevented convergence, with the terms of each equation at the
+    /// start of the step.
     fn failure_location(&self, start: &StepContext<'_, M, T>, jacobian: &M::Jacobian<T>) -> FailureLocation;
-    /// From now on, whether every matrix is to be pivoted as a whole.
+    /// Sets whether later matrices are factorised as a whole with pivoting.
     fn set_pivoted(&mut self, pivoted: bool);
-    /// Whether planned factors solve the systems that they are of; pivoted ones are as good as can
-    /// be.
+    /// Whether the planned factors solve a test system accurately; pivoted factors are always
+    /// accepted.
     fn are_factors_accurate(&self, start: &StepContext<'_, M, T>) -> bool;
-    /// Starts from the same `ẋ` and `z` at all stages, those of the start of the step.
+    /// Sets the initial guess of all stages to `ẋ` and `z` at the start of the step.
     fn begin_from_start(&mut self, point: &ArrayV<M, T>);
-    /// Starts from the polynomial of the last accepted step, whose size is given relative to this
-    /// one.
+    /// Sets the initial guess to the extrapolated polynomial of the last accepted step; `ratio` is
+    /// the ratio of the step sizes.
     fn extrapolate_last_step(&mut self, ratio: f64);
-    /// The variables in the middle of the step from its start values.
+    /// Predicts the variables in the middle of the step from the initial guess.
     fn predict_midpoint(&self, start: &StepContext<'_, M, T>, middle: &mut ArrayV<M, T>);
-    /// Takes over the last accepted step of another method.
+    /// Converts the last accepted step of another method.
     fn adopt_last_step(&mut self, other: &dyn StageSolver<M, T>);
     /// Solves the stages.
     ///
     /// # Errors
-    /// [`Failure`]
+    /// [`NewtonFailure`]
     fn solve(
         &mut self,
         start: &StepContext<'_, M, T>,
@@ -66,45 +66,44 @@ pub trait StageSolver<M: Dae, T: Real> {
         convergence: &mut NewtonMonitor,
         residuals: &mut usize,
     ) -> Result<(), NewtonFailure>;
-    /// The estimated error relative to what is tolerated; `again` if a second, more careful look is
-    /// to decide whether a large one is real.
+    /// The estimated error relative to the estimator tolerance; with `again` a large one is
+    /// evaluated a second time, at the corrected point.
     ///
     /// # Errors
-    /// [`Failure::NotFinite`]
+    /// [`NewtonFailure::NotFinite`]
     fn estimate_error(
         &mut self,
         start: &StepContext<'_, M, T>,
-        again: bool,
+        reevaluate_large_error: bool,
         residuals: &mut usize,
     ) -> Result<f64, NewtonFailure>;
     /// The largest defect at further points of a step in which the model changes its branch,
-    /// relative to what the estimate tolerates.
+    /// relative to the estimator tolerance.
     ///
     /// # Errors
-    /// [`Failure::NotFinite`]
+    /// [`NewtonFailure::NotFinite`]
     fn largest_defect(
         &mut self,
         start: &StepContext<'_, M, T>,
         residuals: &mut usize,
     ) -> Result<f64, NewtonFailure>;
-    /// How the model inside of the step is not that of its start.
+    /// The strongest change of branches within the step.
     fn branch_change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange>;
-    /// The variables where the estimate compares the derivative of the polynomial with the
-    /// solution; whether that is the end of the step, and not its start.
+    /// Writes the variables at the point of the defect; returns whether it is the end of the step,
+    /// not the start.
     fn estimate_point(&self, start: &StepContext<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
-    /// From a residual there to the estimated error of `(x, z)`, in its place.
+    /// Replaces a residual at that point by the estimated error of `(x, z)`.
     fn filter_residual(&mut self, h: T, residual: &mut ArrayK<M, T>);
-    /// What a step of length `h` makes of the residual that was filtered last: see
-    /// [`DefectFilter`].
+    /// The last residual, filtered for a step of length `h`: see [`DefectFilter`].
     fn filtered_defect(&self, h: T) -> FilteredDefect<M, T>;
-    /// How the size of the filtered defect is judged.
+    /// The filter and weights of the second estimate.
     fn defect_filter(&self) -> &DefectFilter;
-    /// The unknowns of the step that was solved last, stages innermost, at the end of a list.
+    /// Appends the unknowns of the last solved step to a list, stages innermost.
     fn append_unknowns(&self, to: &mut Vec<T>);
-    /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a
-    /// stage: else they are extrapolated.
+    /// Writes the variables at the end of a step of length `h`; returns whether `ẋ` and `z` there
+    /// are those of a stage, not extrapolated.
     fn end_point(&self, h: T, point: &mut ArrayV<M, T>) -> bool;
-    /// The step is accepted.
+    /// Makes the solved step the accepted one.
     fn accept_step(&mut self);
     /// The unknowns `(k, z)` of the accepted step, stages innermost.
     fn accepted_unknowns(&self) -> &[T];

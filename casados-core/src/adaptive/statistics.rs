@@ -1,9 +1,9 @@
-//! What the last call did.
+//! Statistics of the last call.
 
-/// What the last call of an adaptive integrator did to choose its steps, successful or not.
+/// Statistics of the step selection of the last call of an adaptive integrator, successful or not.
 ///
-/// Steps that are there are taken again for derivatives and integrals, and by all calls while they
-/// are frozen: what that takes is not counted. So all is zero of calls with frozen steps.
+/// The replay of steps for derivatives and integrals, and of frozen steps, is not counted: all
+/// counts are zero for calls with frozen steps.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -23,27 +23,27 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct AdaptiveStatistics {
-    /// Steps that were accepted.
+    /// Accepted steps.
     pub steps: usize,
-    /// Steps whose error was too large.
+    /// Steps rejected because of their error.
     pub rejected: usize,
-    /// Steps without an estimate of their error: Newton's method was slow or failed, the matrix was
+    /// Steps without an error estimate: Newton's method was slow or failed, the matrix was
     /// singular, or a value was not finite.
     pub failed: usize,
-    /// Evaluations of the residual at one point.
+    /// Evaluations of the residual at one point (not at all stages).
     pub residuals: usize,
     /// Evaluations of the Jacobian.
     pub jacobians: usize,
-    /// Factorisations of the Newton matrix, all eigenvalues together.
+    /// Factorisations of the Newton matrix; those for all eigenvalues count as one.
     pub factorizations: usize,
-    /// Those of them in which the planned elimination was not good enough.
+    /// Factorisations with the dense fallback, since planned pivots were too small.
     pub dense: usize,
-    /// Iterations of Newton's method, all steps together.
+    /// Iterations of Newton's method, summed over all steps.
     pub iterations: usize,
 }
 
 impl AdaptiveStatistics {
-    /// What another interval took.
+    /// Adds the statistics of another interval.
     pub(super) fn add(&mut self, other: &Self) {
         self.steps += other.steps;
         self.rejected += other.rejected;

@@ -1,4 +1,4 @@
-//! The step size: from the estimated error of a step to the length of the next one.
+//! Step-size controllers: from the estimated error of a step to the size of the next one.
 //!
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; K. Gustafsson,
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
@@ -7,23 +7,23 @@
 use super::discontinuity::BranchChange;
 use crate::scalar::{Real, Scalar};
 
-/// A step of an implicit method is this much shorter than the one that would just be accepted,
+/// Safety factor of the step size of implicit methods.
 const SAFETY: f64 = 0.9;
-/// by no more than this shorter than the one before,
+/// Minimum ratio of successive step sizes.
 const MAX_REDUCTION: f64 = 0.2;
-/// and by no more than this longer.
+/// Maximum ratio of successive step sizes.
 const MAX_GROWTH: f64 = 8.0;
 
-/// What is remembered of the last accepted step.
+/// Gustafsson's predictive controller, with the data of the last accepted step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GustafssonController {
     last_step_and_error: Option<(f64, f64)>,
 }
 
 impl GustafssonController {
-    /// The factor for the step size after a step of size `h` with the estimated error `error`,
-    /// relative to the tolerance, that behaves like `h^(1/exponent)`. `effort` is one, or less if
-    /// the step took many iterations.
+    /// The factor for the step size after a step of size `h` whose error, relative to the
+    /// tolerance, is `error`, proportional to `h^(1/exponent)`. `effort` is one, or less after many
+    /// iterations.
     pub fn step_size_factor(&mut self, h: f64, error: f64, exponent: f64, effort: f64) -> f64 {
         let safety = SAFETY * effort;
         let (least, most) = (1.0 / MAX_GROWTH, 1.0 / MAX_REDUCTION);
@@ -38,70 +38,68 @@ impl GustafssonController {
         1.0 / quotient
     }
 
-    /// Forgets the last step: the next one is of another method.
+    /// Forgets the last step, since the method changes.
     pub fn reset(&mut self) {
         self.last_step_and_error = None;
     }
 }
 
-/// How the step size of an explicit method follows its error.
+/// Parameters of the step-size controller of an explicit method.
 #[derive(Clone, Copy, Debug)]
 pub struct PiParameters {
-    /// The error of one step behaves like `h` to this power.
+    /// The order of the local error, a power of `h`.
     pub order: f64,
-    /// How much of the last error takes part,
+    /// The coefficient `β` of the last error.
     pub beta: f64,
-    /// and what stands for it at first.
+    /// The initial value of the last error.
     pub initial_error: f64,
-    /// A step is this much shorter than the one that would just be accepted.
+    /// The safety factor of the step size.
     pub safety: f64,
-    /// Whether a step is no longer than what the trend of the last two asks for, as with implicit
-    /// methods.
+    /// Whether Gustafsson's prediction also limits the step size, as for implicit methods.
     pub uses_prediction: bool,
-    /// By how much a step size may shrink and grow.
+    /// The range of ratios of successive step sizes.
     pub factor_range: (f64, f64),
 }
 
-/// An error that is refused by much.
+/// Error, relative to the tolerance, of a strong rejection.
 const STRONG_REJECTION: f64 = 8.0;
 
-/// The controller of explicit methods: what the error of the last step was takes part (K.
-/// Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods,
-/// ACM Trans. Math. Softw. 17 (1991)).
+/// The PI controller of explicit methods, which includes the error of the last step (K. Gustafsson,
+/// Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods, ACM Trans.
+/// Math. Softw. 17 (1991)).
 #[derive(Clone, Copy, Debug)]
 pub struct PiController {
     parameters: PiParameters,
-    /// The length of the last accepted step, and its error.
+    /// The size of the last accepted step, and its error.
     last_step_and_error: (f64, f64),
-    /// The farthest end of a step that was refused by much: up to here a force may jump, or its
-    /// slope.
+    /// The farthest end of strongly rejected steps: up to here a force or its derivative may jump.
     strong_rejection_end: f64,
 }
 
 /// A step of an explicit method.
 #[derive(Clone, Copy, Debug)]
 pub struct ExplicitStep {
-    /// Where it begins, in the direction of the run,
+    /// The start time, in the direction of the run.
     pub t: f64,
-    /// its length,
+    /// The size of the step.
     pub h: f64,
-    /// and how it changes the branches of the model, if it does.
+    /// The change of branches over the step, if any.
     pub branch_change: Option<BranchChange>,
 }
 
 impl ExplicitStep {
-    /// Whether it is long beside roundoff errors of the time, shortened by a factor: no shorter
-    /// step helps.
+    /// Whether the step, shortened by a factor, is well above the roundoff errors of the time:
+    /// shorter steps do not help.
     fn is_above_rounding<T: Real>(self, factor: f64) -> bool {
         factor * self.h > 1e4 * T::EPSILON * self.t.abs()
     }
 }
 
 impl PiController {
-    /// Where a force jumps between two stages, or its slope, the error of a step is up to so many
-    /// times the difference of the two methods, whose weights cancel there.
+    /// Factor of the error if a force or its derivative jumps between two stages, where the weights
+    /// of the difference cancel.
     const DISCONTINUITY_ERROR_FACTOR: f64 = 8.0;
-    /// Where the model changes its branch it counts so often: there may be many such steps.
+    /// Factor of the error if the model changes its branch: a run may have many such steps.
     const BRANCH_ERROR_FACTOR: f64 = 30.0;
 
     pub fn new(control: PiParameters) -> Self {
@@ -112,9 +110,9 @@ impl PiController {
         }
     }
 
-    /// The error of a step out of the difference of the two methods: larger before the end of a
-    /// step that was refused by much, and where the model changes its branch. Of ever shorter steps
-    /// over a jump one has a small difference by chance, and would be accepted.
+    /// The error of a step from the difference of the two methods, increased up to the end of a
+    /// strongly rejected step and across branches: among ever shorter steps over a jump one has a
+    /// small difference by chance.
     pub fn error_of_difference<T: Real>(&mut self, step: ExplicitStep, difference: f64) -> f64 {
         let is_over_jump = step.t < self.strong_rejection_end;
         if difference >= STRONG_REJECTION {
@@ -129,8 +127,8 @@ impl PiController {
         count * difference
     }
 
-    /// The factor for the step size after a step with this error, within a range. Where the model
-    /// changes its branch the error behaves like `h³` or a lower power.
+    /// The factor for the step size after a step with this error, within a range. If the model
+    /// changes its branch, the error is proportional to `h³` or a lower power.
     pub fn step_size_factor<T: Real>(&mut self, step: ExplicitStep, error: f64) -> f64 {
         let PiParameters {
             order, beta: memory, safety, uses_prediction: predicts, factor_range: range, ..
@@ -157,7 +155,7 @@ impl PiController {
     }
 }
 
-/// `aᵇ`, by roots where these are enough: those of methods with 3, 5 and 7 stages.
+/// `aᵇ`, by roots for the exponents of methods with 3, 5 and 7 stages.
 pub(super) fn fractional_power(a: f64, b: f64) -> f64 {
     let root = Scalar::sqrt(a);
     if b == 0.25 {
@@ -171,11 +169,10 @@ pub(super) fn fractional_power(a: f64, b: f64) -> f64 {
     }
 }
 
-/// The length of a first step, at most the longest: that in which an explicit Euler step changes
-/// the solution, and its derivative, by a hundredth of their size (E. Hairer, S. P. Nørsett,
-/// G. Wanner, Solving Ordinary Differential Equations I, section II.4). `change` is that of the
-/// slope over such a step. Where sizes overflow beside a tiny absolute tolerance nothing is
-/// foreseen: then a short one.
+/// The size of the first step, at most the longest: an explicit Euler step changes the solution and
+/// its derivative by a hundredth (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary
+/// Differential Equations I, section II.4). `change` is the change of the slope over such a step.
+/// If the sizes overflow, with a tiny absolute tolerance, the step is short.
 pub(super) fn first_step_size(
     [size, slope]: [f64; 2],
     longest: f64,

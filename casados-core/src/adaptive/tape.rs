@@ -1,4 +1,4 @@
-//! The accepted steps, as many as there are.
+//! The tape of accepted steps, of variable length.
 
 use crate::error::Error;
 use crate::memory::{extend, push};
@@ -8,25 +8,25 @@ use alloc::vec::Vec;
 /// An accepted step.
 #[derive(Clone, Copy, Debug)]
 pub struct TapeEntry<T> {
-    /// Its start.
+    /// The start time.
     pub t: T,
-    /// Its length.
+    /// The length.
     pub h: T,
-    /// Which method of the family took it.
+    /// The index of its method in the family.
     pub order_index: usize,
-    /// Where its numbers begin.
+    /// The offset of its numbers.
     offset: usize,
 }
 
-/// Steps one after the other, with the numbers of each: the states at its start, then the unknowns
-/// of its stages.
+/// Successive steps and their numbers: the states at the start, followed by the unknowns of the
+/// stages.
 #[derive(Debug)]
 pub struct Tape<T> {
     entries: Vec<TapeEntry<T>>,
-    /// As they were when they were kept.
+    /// The entries at the time of freezing.
     frozen_entries: Vec<TapeEntry<T>>,
     numbers: Vec<T>,
-    /// The numbers of steps that are being taken again.
+    /// The numbers of the steps of a replay.
     replayed_numbers: Vec<T>,
 }
 
@@ -68,7 +68,7 @@ impl<T: Real> Tape<T> {
         numbers.split_at(states.min(numbers.len()))
     }
 
-    /// The last step has another length, and stages to it.
+    /// Replaces the length and the stages of the last step.
     pub fn replace_last_step(&mut self, h: T, states: usize, stages: &[T]) {
         let Some(entry) = self.entries.last_mut() else { return };
         entry.h = h;
@@ -78,7 +78,7 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// Remembers the lengths of the steps.
+    /// Stores the lengths of the steps.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -87,8 +87,7 @@ impl<T: Real> Tape<T> {
         extend(&mut self.frozen_entries, &self.entries)
     }
 
-    /// The steps that were kept fill another interval, each its part of it; whatever they were
-    /// stretched to before.
+    /// Scales the frozen steps, as stored, to another interval.
     pub fn stretch(&mut self, start: T, end: T) {
         let (Some(first), Some(last)) = (self.frozen_entries.first(), self.frozen_entries.last()) else {
             return;
@@ -102,12 +101,12 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// The steps are taken again:
+    /// Begins a replay of the steps.
     pub fn begin_replay(&mut self) {
         self.replayed_numbers.clear();
     }
 
-    /// one after the other, all of the same lengths as before;
+    /// Adds the next step of a replay; all lengths are unchanged.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -116,14 +115,14 @@ impl<T: Real> Tape<T> {
         extend(&mut self.replayed_numbers, stages)
     }
 
-    /// and then they count.
+    /// Replaces the numbers by those of a complete replay.
     pub fn commit_replay(&mut self) {
         if self.replayed_numbers.len() == self.numbers.len() {
             core::mem::swap(&mut self.replayed_numbers, &mut self.numbers);
         }
     }
 
-    /// The step that contains a time; the last one that begins before it.
+    /// The index of the step that contains a time: the last one that starts before it.
     pub fn find_step(&self, t: T) -> usize {
         let forward = self.entries.first().is_none_or(|entry| entry.h >= T::ZERO);
         let after = self.entries.partition_point(|entry| if forward { entry.t <= t } else { entry.t >= t });

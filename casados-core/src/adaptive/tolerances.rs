@@ -1,4 +1,4 @@
-//! Tolerances: what was asked for, and what the estimator and Newton's method make of it.
+//! Tolerances of the user, of the error estimate and of Newton's method.
 //!
 //! ```text
 //! estimator.0 = 0.1 rtol^((s+1)/(2s))        user_ratio = estimator.0 / rtol        estimator.1 = user_ratio · atol
@@ -13,37 +13,37 @@ use crate::scalar::{Real, Scalar};
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 
-/// Where the first estimate is asked for this much less than the solution, or even less, its
-/// tolerance says nothing of components that lose their order; where it is asked for about as much,
-/// it says all, and the second one fades out.
+/// If the estimator tolerance exceeds the user's by this factor or more, the second estimate has
+/// full weight: the first one does not control components with order reduction. For smaller ratios
+/// the second estimate fades out.
 pub(super) const ORDER_REDUCTION_RATIO: f64 = 4.0;
 
 /// Tolerances of `(x, z)`.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 pub struct Tolerances<M: Dae, T: Plain> {
-    /// As they were asked for,
+    /// The user's relative and absolute tolerances.
     pub rtol: ArrayK<M, T>,
     pub atol: ArrayK<M, T>,
-    /// as the estimate needs them, relative and absolute,
+    /// The relative and absolute tolerances of the first estimate.
     pub estimator_tolerances: ArrayK<M, (T, T)>,
-    /// the reciprocals of the errors that it tolerates,
+    /// The reciprocals of the errors that they tolerate.
     pub scale: ArrayK<M, T>,
-    /// and how many times as large those of the tolerances are that were asked for.
+    /// The ratios of the estimator tolerances and the user's.
     pub user_ratio: ArrayK<M, T>,
-    /// The largest of these.
+    /// The largest of these ratios.
     pub tolerance_ratio: f64,
-    /// The estimate behaves like `h` to this power.
+    /// The estimate is proportional to this power of `h`.
     pub estimate_order: f64,
-    /// Where Newton's method may stop.
+    /// The tolerance of Newton's method.
     pub newton_tolerance: f64,
-    /// Estimated errors that are smaller are of rounding.
+    /// Estimated errors below this are rounding errors.
     pub noise: f64,
 }
 
 impl<M: Dae, T: Real> Tolerances<M, T> {
-    /// Those of a method with so many stages: its estimate is of order `s`, its steps of `2s − 1`
-    /// or more.
+    /// Sets the tolerances of a method with this number of stages: its estimate has order `s`, its
+    /// steps have order `2s − 1` or higher.
     pub fn set_estimator_tolerances(&mut self, stages: usize, damps: bool) {
         let s = stages as f64;
         self.estimate_order = s + 1.0;
@@ -65,7 +65,7 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
         for (((estimator, user_ratio), rtol), atol) in
             estimator.as_mut().iter_mut().zip(user_ratio).zip(rtol.as_ref()).zip(atol.as_ref())
         {
-            // Mostly they are all the same.
+            // Usually all tolerances are equal.
             if before.0 != *rtol {
                 before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
             }
@@ -74,11 +74,11 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
             *estimator = (before.1, *user_ratio * *atol);
             finest = finest.min(before.1.to_f64());
         }
-        // Where the error of the iteration is small beside that of the step. It is the same in step
-        // after step, and what is not damped adds up over as many as there are, like the tolerance
-        // to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller by that, and
-        // of Radau methods by a power of what superconvergence takes for granted. It stays above
-        // rounding.
+        // The error of the iteration has to be small relative to that of the step. It is similar in
+        // successive steps, so that undamped errors accumulate with the number of steps, a power
+        // −1/(2s) of the tolerance. The tolerance of Gauss methods, which damp nothing, is smaller
+        // by this power; that of Radau methods is smaller by a power of the tolerance ratio. It
+        // remains above rounding.
         let wanted = if damps {
             let spread = (ORDER_REDUCTION_RATIO / *tolerance_ratio).min(1.0);
             Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(spread)
@@ -89,7 +89,7 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
         (*newton, *noise) = (wanted.max(10.0 * rounding), 100.0 * rounding);
     }
 
-    /// What the estimate tolerates at these `(x, z)`.
+    /// Updates the scales of the estimator tolerances at the values `(x, z)`.
     pub fn update_scales(&mut self, states: &[T]) {
         let Self { estimator_tolerances: estimator, scale, .. } = self;
         for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(estimator.as_ref()).zip(states) {
@@ -97,7 +97,7 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
         }
     }
 
-    /// What the user tolerates at these `(x, z)`.
+    /// Updates the scales of the user's tolerances at the values `(x, z)`.
     pub fn update_user_scales(&mut self, states: &[T]) {
         let Self { rtol, atol, scale, .. } = self;
         let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
@@ -107,10 +107,10 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
     }
 }
 
-/// Loops over more elements are functions of their own, and not unrolled.
+/// Loops over more elements are separate functions, which are not unrolled.
 pub(super) const MAX_UNROLLED_LENGTH: usize = 6;
 
-/// `√(Σ (v/scale)² / n)`, with the reciprocals of the scales.
+/// `√(Σ (v scale)² / n)`; the scales are reciprocals of tolerances.
 #[inline(always)]
 pub(super) fn norm<T: Real>(values: &[T], scale: &[T]) -> f64 {
     let sum = if values.len() <= MAX_UNROLLED_LENGTH {
@@ -136,7 +136,7 @@ fn looped_sum_of_squares<T: Real>(values: &[T], scale: &[T]) -> T {
     sum_of_squares(values, scale)
 }
 
-/// The root of a mean of squares.
+/// The root of the mean of squares.
 pub(super) fn root_mean_square(sum: f64, count: usize) -> f64 {
     Scalar::sqrt(sum / count.max(1) as f64)
 }

@@ -1,8 +1,7 @@
-//! Derivatives in the choice of the steps: the estimate of the error of a step, applied to
-//! `V = dx/d(x₀, u, p)`.
+//! Error control of sensitivities: the error estimate of a step, applied to `V = dx/d(x₀, u, p)`.
 //!
-//! A step that the states accept is taken again to rounding and differentiated. Its estimate is a
-//! linear function of the slopes of its stages, and so is that of a column of `V`, with the
+//! A step that the states accept is replayed, solved to rounding, and differentiated. Its estimate
+//! is a linear function of the slopes of its stages, and so is that of a column of `V`, with the
 //! derivatives `dk_i` of the slopes:
 //!
 //! ```text
@@ -10,17 +9,17 @@
 //! E = h Σ_i e_i dk_i e_c                                                                        explicit
 //! ```
 //!
-//! where the implicit methods look at their estimate: the start of the step or, if that has no
-//! stage there, the end. An element of `E` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the
-//! magnitude `s_c` of what is varied (A. C. Hindmarsh, R. Serban, User documentation for CVODES,
-//! "forward sensitivity analysis"); the worst column counts.
+//! at the point of the estimate of implicit methods: the start of the step or, for a method without
+//! a stage at the end, the end. An element of `E` is measured by `atol_r / s_c + rtol_r |V_rc|`,
+//! with the magnitude `s_c` of the varied quantity (A. C. Hindmarsh, R. Serban, User documentation
+//! for CVODES, "forward sensitivity analysis"); the largest error of all columns decides.
 
 use super::consistent::Consistent;
 use super::error_estimate::RelativeErrors;
 use super::newton_monitor::NewtonFailure;
 use super::pairs::EmbeddedPair;
 use super::point::ModelPoint;
-use super::replay::{AcceptedStep, DynStepDifferentiator};
+use super::replay::{DynStepDifferentiator, StepRecord};
 use super::stages::{FilteredDefect, MAX_STAGES, StageSolver, StepContext};
 use super::tolerances::{Tolerances, root_mean_square};
 use crate::error::Error;
@@ -33,16 +32,16 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// Memory of derivatives, a row for each direction.
+/// Memory of derivatives, one row for each direction.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 struct VariationalMemory<M: Dae, T: Plain> {
-    /// Of `(x, z)` at the start of the step, and at its end.
+    /// The derivatives of `(x, z)` at the start of the step, and at its end.
     start_sensitivities: ArrayW<M, ArrayK<M, T>>,
     end_sensitivities: ArrayW<M, ArrayK<M, T>>,
-    /// Of a sum of slopes, by `(x_n, u, p)`.
+    /// The derivatives of a sum of slopes with respect to `(x_n, u, p)`.
     local_derivatives: ArrayW<M, ArrayX<M, T>>,
-    /// Of two such sums, by `(x₀, u, p)`.
+    /// The derivatives of two such sums with respect to `(x₀, u, p)`.
     rate_derivatives: [ArrayW<M, ArrayX<M, T>>; 2],
     jacobian: M::Jacobian<T>,
     f: ArrayK<M, T>,
@@ -50,7 +49,7 @@ struct VariationalMemory<M: Dae, T: Plain> {
     magnitudes: ArrayW<M, T>,
 }
 
-/// The derivatives along a run.
+/// The sensitivities of a run.
 pub struct Variational<M: Dae, T: Real> {
     differentiator: Box<dyn DynStepDifferentiator<M, T>>,
     memory: Box<VariationalMemory<M, T>>,
@@ -71,8 +70,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(Self { differentiator: replays, memory, stage_unknowns: unknowns })
     }
 
-    /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of
-    /// what is there.
+    /// Begins a run with the magnitudes of `(x₀, u, p)`; the default is the absolute value of each
+    /// quantity.
     ///
     /// # Errors
     /// As [`Consistent::forward`].
@@ -107,15 +106,15 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(())
     }
 
-    /// A step was accepted.
+    /// Moves to the end of an accepted step.
     pub fn accept_step(&mut self) {
         let VariationalMemory { start_sensitivities: before, end_sensitivities: after, .. } =
             &mut *self.memory;
         before.as_mut().copy_from_slice(after.as_ref());
     }
 
-    /// The derivatives at the end of a step.
-    fn differentiate_step(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<(), Error> {
+    /// Computes the derivatives at the end of a step.
+    fn differentiate_step(&mut self, step: &StepRecord<'_, M, T>) -> Result<(), Error> {
         let (nx, VariationalMemory { start_sensitivities: before, end_sensitivities: after, .. }) =
             (M::Shape::NX, &mut *self.memory);
         let forward = self.differentiator.forward(step)?;
@@ -144,7 +143,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(())
     }
 
-    /// The derivatives of `Σ_i weight_i k_i` of the step that was taken.
+    /// Computes the derivatives of `Σ_i weight_i k_i` of the last step.
     fn set_rate_derivatives(&mut self, level: usize, weights: &[f64], which: usize) -> Result<(), Error> {
         let (
             nx,
@@ -171,8 +170,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(())
     }
 
-    /// The estimated error of the derivatives over an implicit step that was solved, relative to
-    /// what is tolerated; `again` as in [`StageSolver::error`].
+    /// The estimated error of the sensitivities over an implicit step, relative to the tolerance;
+    /// `again` as in [`StageSolver::estimate_error`].
     ///
     /// # Errors
     /// The step cannot be differentiated.
@@ -189,7 +188,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         self.stage_unknowns.clear();
         stages.append_unknowns(&mut self.stage_unknowns);
         let unknowns = core::mem::take(&mut self.stage_unknowns);
-        let taken = self.differentiate_step(&AcceptedStep {
+        let taken = self.differentiate_step(&StepRecord {
             start: at,
             h: start.h,
             stage_unknowns: &unknowns,
@@ -221,7 +220,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 let mut error = ArrayK::<M, T>::zeroed();
                 variational_residual::<M, T>(jacobian, slope.as_ref(), y.as_ref(), direction, error.as_mut());
                 stages.filter_residual(start.h, &mut error);
-                // As for the states: what is extrapolated of `z` is not kept.
+                // As for the states, the extrapolated `z` is discarded.
                 let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
                 let states = [before.as_ref(), after.as_ref()]
                     .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref()));
@@ -251,11 +250,11 @@ impl<M: Dae, T: Real> Variational<M, T> {
 }
 
 impl<M: Ode, T: Real> Variational<M, T> {
-    /// The same of a step of an explicit pair with its end; not finite if it cannot be
-    /// differentiated.
+    /// The estimated error of the sensitivities over a step of an explicit pair; not finite if the
+    /// step cannot be differentiated.
     pub fn explicit_error<B: EmbeddedPair<S>, const S: usize>(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         end: &[T],
         inputs: &[T],
         tolerances: impl Iterator<Item = (T, T)> + Clone,
@@ -328,7 +327,7 @@ fn variational_residual<M: Dae, T: Real>(
     to: &mut [T],
 ) {
     let (nx, nk) = (M::Shape::NX, M::Shape::NK);
-    // Where a direction that is no state is among the variables.
+    // The index of a direction that is not a state, among the variables.
     let own = direction.checked_sub(nx).map(|index| nx + nk + index);
     for (entry, value) in jacobian.as_ref().iter().enumerate() {
         let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
@@ -345,7 +344,7 @@ fn variational_residual<M: Dae, T: Real>(
     }
 }
 
-/// What is tolerated of a column: `(rtol, atol)` are of the states.
+/// The scales of a column, from the tolerances `(rtol, atol)` of the states.
 fn column_scales<'a, T: Real>(
     [before, after]: [&'a [T]; 2],
     tolerances: impl Iterator<Item = (T, T)> + 'a,
@@ -358,7 +357,7 @@ fn column_scales<'a, T: Real>(
         .map(move |((before, after), (rtol, atol))| atol / magnitude + rtol * before.abs().max(after.abs()))
 }
 
-/// The root of the mean of the squares relative to what is tolerated.
+/// The root mean square relative to the scales.
 fn scaled_norm<'a, T: Real>(
     error: &[T],
     states: [&'a [T]; 2],

@@ -1,4 +1,4 @@
-//! The questions that a batch can be asked, each known by what it answers.
+//! The outputs of a batch call, one type for each mode.
 
 use super::intervals::{Interval, vector};
 use super::lanes::{MAX_LANES, MaskedResult, Unpack, all_lanes_true};
@@ -10,18 +10,17 @@ use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, copy_into};
 
-/// A result of several intervals, with a number for each of them in the lanes of its registers. All
-/// of it is inlined into kernels.
+/// Results of several intervals, one in each lane. Its functions are inlined into kernels.
 pub trait LaneResults<E: Lanes, R> {
-    /// Whether all numbers are finite, lane by lane, but for those that were looked at when they
-    /// were written: matrices.
+    /// Returns the lanes without a non-finite number; matrices are left out, since they are checked
+    /// when they are written.
     fn is_finite(&self) -> E::Mask;
-    /// The results of the lanes that are good, each in its element of a slice that has it somewhere
-    /// inside.
+    /// Writes the results of valid lanes; `select` returns the result within an element of the
+    /// slice.
     fn unpack<Q>(&self, valid: &[bool], results: &mut [Q], select: impl Fn(&mut Q) -> &mut R + Copy);
 }
 
-/// The elements of a field, for each lane that is good in its result.
+/// Writes a field of the results of valid lanes.
 macro_rules! unpack_field {
     ($self:ident, $field:ident, $good:ident, $results:ident, $get:ident) => {{
         let mut to: [&mut [T]; MAX_LANES] = Default::default();
@@ -64,7 +63,7 @@ wide!(Adjoint: nominal; grad_x0, grad_u, grad_p;);
 wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p;);
 wide!(Hessian: first;; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
 
-/// Which lanes are finite, beside those that are not in `finite`.
+/// Returns the lanes of `finite` whose values are all finite.
 #[inline(always)]
 fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
     for &value in values {
@@ -73,19 +72,19 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
     finite
 }
 
-/// What a call of a batch answers for each interval.
+/// The output of a batch call for each interval.
 pub trait BatchOutput<M: Dae, T: Real>: Copy + Send {
-    /// The same with a number for each lane.
+    /// The outputs of a group, one in each lane.
     type LaneResults<E: Lanes<Cell: AsRef<[T]>>>: LaneResults<E, Self>;
-    /// How many columns of derivatives are computed for it.
+    /// Number of columns of derivatives.
     const COLUMNS: usize;
 
-    /// For several intervals at once.
+    /// Computes a group of intervals.
     fn compute_group<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
         group: &mut I::Group<E>,
     ) -> MaskedResult<'_, E, Self::LaneResults<E>>;
 
-    /// For one interval, where it belongs: results that are large are written once.
+    /// Computes one interval into `self`, so that large results are written once.
     fn compute_single<I: Single<Model = M, Number = T>>(
         &mut self,
         single: &mut I,

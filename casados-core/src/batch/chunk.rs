@@ -1,5 +1,4 @@
-//! What a call of a batch is to do, and its parts: consecutive intervals, with what is found out
-//! about them.
+//! The task of a batch call, and its chunks of consecutive intervals with their outputs.
 
 use super::batch_output::BatchOutput;
 use super::error::BatchError;
@@ -13,13 +12,13 @@ use crate::scalar::{Lanes, Real, Widest};
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-/// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or
-/// computed one interval after the other: what does not lie in it is fetched from afar again and
-/// again.
+/// Maximal fraction of the second-level cache for the factors and right-hand sides of a group.
+/// Larger groups are split, down to single intervals, since they would be loaded from main memory
+/// repeatedly.
 const MAX_CACHE_FRACTION: f64 = 5.0 / 8.0;
 
-/// How many intervals are computed together: as many as the widest register has whose group fits
-/// into the cache.
+/// Returns the number of intervals per group: the lanes of the widest register whose group fits the
+/// cache.
 pub fn lanes_per_group<I: Single, R: BatchOutput<I::Model, I::Number>>(options: &Options) -> usize {
     let mut max_lanes = MAX_LANES;
     loop {
@@ -34,10 +33,10 @@ pub fn lanes_per_group<I: Single, R: BatchOutput<I::Model, I::Number>>(options: 
     }
 }
 
-/// The lanes of a register, and whether they are to be used.
+/// Returns the lanes of a register, and whether a group fits the cache.
 struct CacheFit<'a, I> {
     options: &'a Options,
-    /// How many columns of derivatives are computed.
+    /// Number of columns of derivatives.
     columns: usize,
     integrator: PhantomData<I>,
 }
@@ -50,44 +49,44 @@ impl<I: Single> Widest<I::Number> for CacheFit<'_, I> {
     }
 }
 
-/// What is to be done.
+/// The task of a call.
 pub struct BatchTask<'a, I: Single> {
     pub inputs: &'a BatchInputs<'a, I::Model, I::Number>,
     pub options: &'a Options,
     pub tableau: &'a I::Tableau,
     pub start_values: Option<[&'a [I::Number]; 2]>,
-    /// How many intervals are computed together.
+    /// Number of intervals that are computed together.
     pub lanes: usize,
-    /// How many are simulated together before each is differentiated alone.
+    /// Number of intervals that are simulated together before each is differentiated alone.
     pub simulation_lanes: usize,
-    /// Whether stages that are remembered are solutions at these inputs.
+    /// Whether stored stages are solutions for these inputs.
     pub reuses_solutions: bool,
 }
 
 impl<I: Single> BatchTask<'_, I> {
-    /// How many intervals a group has.
+    /// Returns the number of intervals of a group.
     pub fn group_size(&self) -> usize {
         self.lanes.max(self.simulation_lanes)
     }
 }
 
-/// Takes results one after the other, with the numbers of their intervals.
+/// Receives results in order, with the indices of their intervals.
 pub type Sink<'a, R> = &'a mut dyn FnMut(usize, &R);
 
-/// Consecutive intervals, and where what is found out about them belongs.
+/// Consecutive intervals and their outputs.
 pub struct IntervalChunk<'a, I: Single, R> {
     pub first_interval: usize,
-    /// As many as there are intervals, or memory for those of a group, or for one: then the result
-    /// of an interval is gone when the next one is computed.
+    /// One result for each interval, or memory for those of one group or of one interval, which is
+    /// reused.
     pub results: &'a mut [R],
     pub status: &'a mut [Result<(), Error>],
-    /// The stages of all steps of every interval; empty without a warm start, as `warm`.
+    /// The stages of all steps of every interval; empty without a warm start, as `has_stages`.
     pub stages: &'a mut [I::Stages],
     pub has_stages: &'a mut [bool],
 }
 
 impl<'a, I: Single, R> IntervalChunk<'a, I, R> {
-    /// The next intervals, which are taken away.
+    /// Splits off the first `count` intervals.
     pub fn split_off_front(&mut self, count: usize, steps: usize) -> IntervalChunk<'a, I, R> {
         let first = self.first_interval;
         let count = count.min(self.status.len());
@@ -101,13 +100,14 @@ impl<'a, I: Single, R> IntervalChunk<'a, I, R> {
         }
     }
 
-    /// Where the result of an interval is: all have one place if there is no more.
+    /// Returns the index of the result of an interval; all intervals share the last element if
+    /// there are fewer.
     pub fn result_index(&self, index: usize) -> usize {
         index.min(self.results.len().saturating_sub(1))
     }
 }
 
-/// Makes a vector as long as that.
+/// Resizes a vector.
 pub fn try_resize<V: Clone>(vector: &mut Vec<V>, length: usize, value: V) -> Result<(), BatchError> {
     let bytes = length.saturating_mul(size_of::<V>());
     vector.try_reserve(length.saturating_sub(vector.len())).map_err(|_| BatchError::OutOfMemory { bytes })?;
@@ -115,7 +115,7 @@ pub fn try_resize<V: Clone>(vector: &mut Vec<V>, length: usize, value: V) -> Res
     Ok(())
 }
 
-/// The first elements, which are taken away.
+/// Splits off the first elements.
 fn split_front<'a, V>(slice: &mut &'a mut [V], count: usize) -> &'a mut [V] {
     let count = count.min(slice.len());
     let (first, rest) = core::mem::take(slice).split_at_mut(count);

@@ -1,9 +1,9 @@
-//! Why a batch has not all of its results.
+//! Errors of batches.
 
 use crate::error::{Argument, Error};
 use core::fmt;
 
-/// Why a batch has not all of its results.
+/// The reason why results of a batch are missing.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -23,35 +23,35 @@ use core::fmt;
 #[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum BatchError {
-    /// A slice has not one element for each interval (nor one for all, where that is allowed).
+    /// A slice does not have one element for each interval (or one for all, if that is allowed).
     /// Nothing was computed.
     Length {
-        /// What it is the slice of.
+        /// The slice.
         slice: Slice,
-        /// How many elements it has.
+        /// Number of its elements.
         length: usize,
-        /// How many intervals there are.
+        /// Number of intervals.
         intervals: usize,
     },
-    /// Intervals have no result; all others have. What happened to each of them is its `status`.
+    /// Some intervals have no result; all others do. `status` returns the error of each interval.
     Intervals {
-        /// How many failed.
+        /// Number of failed intervals.
         failed: usize,
-        /// The first one that did.
+        /// The first failed interval.
         first: usize,
-        /// Why.
+        /// Its error.
         error: Error,
     },
-    /// The integrator could not be made: an option, or its tableau. Nothing was computed.
+    /// The integrator could not be created: invalid options or tableau. Nothing was computed.
     Integrator(Error),
-    /// The memory could not be allocated. Nothing was computed.
+    /// Memory could not be allocated. Nothing was computed.
     OutOfMemory {
-        /// Its size.
+        /// Size of the allocation.
         bytes: usize,
     },
 }
 
-/// A slice that a batch is given.
+/// A slice that is passed to a batch.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -74,9 +74,9 @@ pub enum BatchError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Slice {
-    /// An argument of the intervals.
+    /// An input of the intervals.
     Argument(Argument),
-    /// The place for the results.
+    /// The slice of the results.
     Results,
 }
 

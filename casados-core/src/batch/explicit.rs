@@ -1,4 +1,4 @@
-//! Explicit methods.
+//! Groups of intervals for explicit methods.
 
 use super::intervals::{Interval, vector};
 use super::lanes::{MAX_LANES, MaskedResult};
@@ -72,7 +72,7 @@ impl<M: Ode, B: Method<S>, const S: usize, T: Real> Standard for Integrator<M, B
     };
 }
 
-/// A group of intervals, and the memory that it needs.
+/// A group of intervals and its memory.
 pub struct Group<M: Ode, E: Lanes, const S: usize> {
     engine: Engine<M, E, S, Heap>,
     grid: Grid<E>,
@@ -81,7 +81,7 @@ pub struct Group<M: Ode, E: Lanes, const S: usize> {
 }
 
 impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
-    /// What a call answers.
+    /// Runs a call of the engine.
     fn run_engine<'e, R>(
         &'e mut self,
         call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> MaskedResult<'e, E, R>,
@@ -90,7 +90,7 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
         call(engine, grid, <Heap>::nominal(lambda)?.as_ref())
     }
 
-    /// The same of one with derivatives in all directions.
+    /// Runs a call of the engine with derivatives in all directions.
     fn run_engine_with_panels<'e, R>(
         &'e mut self,
         call: impl FnOnce(

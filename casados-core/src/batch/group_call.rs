@@ -1,4 +1,4 @@
-//! The intervals of a group side by side, and what each of them gets.
+//! Computes a group of intervals, and writes the result of each.
 
 use super::batch_output::{BatchOutput, LaneResults};
 use super::chunk::{BatchTask, IntervalChunk};
@@ -14,18 +14,18 @@ use crate::scalar::{Lanes, Widest};
 use alloc::boxed::Box;
 use core::any::Any;
 
-/// Groups of the registers that a machine has.
+/// Groups for the register types of the machine.
 pub type GroupCache = [Option<Box<dyn Any + Send + Sync>>; 2];
 
-/// The intervals of a group that can be computed, each in its lane.
+/// The intervals of a group with valid inputs, one in each lane.
 pub type LaneIntervals<'a, I> =
     [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MAX_LANES];
 
-/// Gives every interval its result, where all is well and finite.
+/// Writes the results of lanes that have converged and are finite.
 struct Distribute<'a, E: Lanes, W, R> {
     converged_lanes: E::Mask,
     lane_results: &'a W,
-    /// On entry which lanes are asked for, on return which are good.
+    /// On entry the lanes with an interval, on return those with a valid result.
     valid_lanes: &'a mut [bool; MAX_LANES],
     results: &'a mut [R],
 }
@@ -46,7 +46,7 @@ impl<E: Lanes, W: LaneResults<E, R>, R> Kernel for Distribute<'_, E, W, R> {
     }
 }
 
-/// The intervals of a group side by side.
+/// A call that computes the intervals of a group.
 pub struct GroupCall<'a, 'b, 'c, I: Single, R> {
     pub task: &'a BatchTask<'b, I>,
     pub groups: &'a mut GroupCache,
@@ -56,22 +56,22 @@ pub struct GroupCall<'a, 'b, 'c, I: Single, R> {
 }
 
 impl<I: Single, R: BatchOutput<I::Model, I::Number>> Widest<I::Number> for GroupCall<'_, '_, '_, I, R> {
-    /// For which intervals there is a result.
+    /// The intervals with a result.
     type Output = Result<[bool; MAX_LANES], Error>;
 
-    // What callers have of it they do not have to optimise again.
+    // Not inlined, so that it is optimised once for all callers.
     #[inline(never)]
     fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> Self::Output {
         let Self { task: work, groups, statistics, intervals, chunk: share } = self;
         let mut valid_lanes = [false; MAX_LANES];
         let has_group_type = |group: &Box<dyn Any + Send + Sync>| (**group).is::<I::Group<E>>();
-        // Its own place, or one that is free.
+        // The slot of this register type, or a free one.
         let cache_slot = groups.iter_mut().find(|place| place.as_ref().is_none_or(has_group_type));
         let group = cache_slot.map(|group| {
             group.get_or_insert_with(|| Box::new(I::Group::<E>::new(work.options, work.tableau)))
         });
         let group = group.and_then(|group| group.downcast_mut::<I::Group<E>>());
-        // Lanes that nobody needs hold a copy of the first interval.
+        // Unused lanes hold a copy of the first interval.
         let first_lane = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first_lane)) = (group, first_lane) else { return Ok(valid_lanes) };
         let Some(Some(padding_interval)) = intervals.get(first_lane) else { return Ok(valid_lanes) };

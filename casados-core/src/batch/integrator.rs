@@ -1,4 +1,4 @@
-//! The batch as its users see it.
+//! The public interface to batches.
 
 use super::batch_output::BatchOutput;
 use super::chunk::{BatchTask, IntervalChunk, Sink, lanes_per_group, try_resize};
@@ -24,21 +24,21 @@ use bytemuck::Zeroable;
 type StartValues<I> =
     (VectorX<<I as Alone>::Model, <I as Alone>::Number>, VectorZ<<I as Alone>::Model, <I as Alone>::Number>);
 
-/// Weights `λ` of the ends of intervals and `ν` of the algebraic states at their starts.
+/// Weights `λ` of the final states, and `ν` of the initial algebraic states.
 pub(crate) type Weights<'a, I> = (
     Option<&'a [VectorX<<I as Alone>::Model, <I as Alone>::Number>]>,
     Option<&'a [VectorZ<<I as Alone>::Model, <I as Alone>::Number>]>,
 );
 
-/// Integrates many intervals of one model, as the integrator `I` does one; see
+/// Integrates many intervals of one model with the method of the integrator `I`; see
 /// [`Batch`](super::Batch).
 ///
-/// Every call writes one result for each interval into the caller's slice. An interval that fails
-/// is reported with the error that a single call would return, leaves no result in its element of
-/// the slice, and has no influence on the others.
+/// Every call writes one result for each interval to the caller's slice. A failed interval is
+/// reported with the error of a single call; its element of the slice remains unchanged, and the
+/// other intervals are not affected.
 ///
 /// # Errors
-/// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
+/// Every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
 /// [`BatchError::Intervals`] if intervals failed.
 ///
 /// ```
@@ -61,22 +61,23 @@ pub(crate) type Weights<'a, I> = (
 pub struct Integrator<I: Single> {
     options: Options,
     tableau: I::Tableau,
-    /// One for each thread.
+    /// One worker for each thread.
     workers: Vec<Worker<I>>,
     threads: usize,
     start_values: Option<StartValues<I>>,
     status: Vec<Result<(), Error>>,
-    /// The stages of every step of every interval, and whether there are any.
+    /// The stages of every step of every interval; `has_stages` is whether they are valid.
     stages: Vec<I::Stages>,
     has_stages: Vec<bool>,
-    /// Whether stages are remembered without a warm start, too; and whether those are solutions.
+    /// Whether stages are also stored without a warm start; `reuses_solutions` is whether they are
+    /// solutions.
     stores_stages: bool,
     reuses_solutions: bool,
     statistics: BatchStatistics,
 }
 
 impl<I: Standard> Integrator<I> {
-    /// A batch of any number of intervals.
+    /// Returns a batch for any number of intervals.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
@@ -86,11 +87,11 @@ impl<I: Standard> Integrator<I> {
 }
 
 impl<I: Single<Method = Custom<S>, Tableau = Tableau<S>>, const S: usize> Integrator<I> {
-    /// A batch for a tableau of the user's own.
+    /// Returns a batch for a user-defined tableau.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
-    /// two nodes are equal; [`Error::NotExplicit`] of an implicit tableau for explicit methods.
+    /// two nodes are equal; [`Error::NotExplicit`] for an implicit tableau of an explicit method.
     pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Self::build(options, tableau)
     }
@@ -103,7 +104,7 @@ impl<I: Single> core::fmt::Debug for Integrator<I> {
     }
 }
 
-/// A batch with the same options and start values: its memory is its own, and empty until the first
+/// Copies options and start values. The copy has its own memory, which is empty until its first
 /// call.
 impl<I: Single> Clone for Integrator<I> {
     fn clone(&self) -> Self {
@@ -143,12 +144,12 @@ impl<I: Single> Integrator<I> {
         })
     }
 
-    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the
-    /// nominal values of the model. Explicit methods do not read them; with [`Start::Zero`] nobody
-    /// does, and with [`Start::Warm`] only where there is no warm start.
+    /// Sets start values `ẋ` and `z` of Newton's method, at all stages of all intervals; they
+    /// replace the nominal values of the model. They are not read by explicit methods or with
+    /// [`Start::Zero`], and with [`Start::Warm`] only without a warm start.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last values stay.
+    /// [`Error::NonFiniteInput`]; the last values remain valid.
     pub fn set_start(
         &mut self,
         xdot: &VectorX<I::Model, I::Number>,
@@ -160,46 +161,46 @@ impl<I: Single> Integrator<I> {
         Ok(())
     }
 
-    /// How many threads share the intervals; as many as rayon has if never set. Results are the
-    /// same to the last bit.
+    /// Sets the number of threads; the default is that of rayon. Results do not depend on it, bit
+    /// for bit.
     #[cfg(feature = "parallel")]
     pub fn set_threads(&mut self, threads: usize) {
         self.threads = threads.max(1);
     }
 
-    /// Forgets the warm start.
+    /// Discards the warm start.
     pub fn reset(&mut self) {
         self.has_stages.fill(false);
     }
 
-    /// From now on all calls remember their stages. With `solved` those of the following calls are
-    /// those of the last one, where it was successful: they are at the same inputs, and only
-    /// differentiate.
+    /// Makes all following calls store their stages. With `reuse_as_solutions`, the inputs of the
+    /// following calls equal those of the last one: stored stages of successful intervals are then
+    /// solutions, which are only differentiated.
     pub(crate) fn store_stages(&mut self, reuse_as_solutions: bool) {
         (self.stores_stages, self.reuses_solutions) = (true, reuse_as_solutions);
     }
 
-    /// The options.
+    /// Returns the options.
     #[must_use]
     pub fn options(&self) -> &Options {
         &self.options
     }
 
-    /// What the last call did.
+    /// Returns the statistics of the last call.
     #[must_use]
     pub fn statistics(&self) -> &BatchStatistics {
         &self.statistics
     }
 
-    /// What happened to an interval in the last call.
+    /// Returns the outcome of an interval in the last call.
     ///
     /// # Errors
-    /// Those of a single call; [`Error::NoResult`] if there was no such interval.
+    /// Those of a single call; [`Error::NoResult`] if the interval does not exist.
     pub fn status(&self, interval: usize) -> Result<(), Error> {
         self.status.get(interval).copied().unwrap_or(Err(Error::NoResult))
     }
 
-    /// `x₊`, and `z` at both ends of every interval.
+    /// Computes `x₊`, and `z` at both ends of every interval.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -211,7 +212,7 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, None, None, results.len())?, results, None)
     }
 
-    /// The solutions, and their derivatives with respect to `x₀`, `u` and `p`.
+    /// Computes the solutions, and their derivatives with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -223,8 +224,8 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, None, None, results.len())?, results, None)
     }
 
-    /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for
-    /// each interval, or one for all.
+    /// Computes the solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one
+    /// `λ` for each interval, or one for all.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -237,7 +238,7 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
-    /// The solutions, their derivatives, and the gradients of `λᵀx₊`.
+    /// Computes the solutions, their derivatives, and the gradients of `λᵀx₊`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -250,7 +251,7 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
-    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
+    /// Computes the solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -263,9 +264,9 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
-    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the
-    /// algebraic states `z₀` at the starts of the intervals; one `ν` for each interval, or one for
-    /// all.
+    /// Computes the solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`,
+    /// with the algebraic states `z₀` at the starts of the intervals; one `ν` for each interval, or
+    /// one for all.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -288,8 +289,8 @@ impl<I: Single> Integrator<I> {
         self.run(&BatchInputs::new(intervals, Some(lambda), Some(nu), results.len())?, results, None)
     }
 
-    /// An integrator of single intervals that solves the stages of this one, also of
-    /// [lifted](Options::lifted) ones.
+    /// Returns an integrator of single intervals that solves for the stages, even if stages of this
+    /// batch are [lifted](Options::lifted).
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -302,7 +303,8 @@ impl<I: Single> Integrator<I> {
         Ok(single)
     }
 
-    /// Lets such an integrator start where an interval of the last call ended, if that is known.
+    /// Sets the stages of an interval in the last call as warm start of such an integrator, if they
+    /// are stored.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -312,9 +314,9 @@ impl<I: Single> Integrator<I> {
         single.start(stages.filter(|_| warm), false)
     }
 
-    /// The results of any call, with weights `λ` and `ν` if it has some, shown to `sink` in order,
-    /// up to the first interval that fails. One thread has no more memory than for one group, in
-    /// `room`: it stays in the caches.
+    /// Computes the results of any mode, with weights `λ` and `ν` or empty ones, and passes them to
+    /// `sink` in order, up to the first failed interval. With one thread `result_buffer` has the
+    /// size of one group, so that it stays in the caches.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -331,9 +333,9 @@ impl<I: Single> Integrator<I> {
         self.run(inputs, result_buffer, Some(sink))
     }
 
-    /// How many intervals are computed together for such a result, and how many are simulated
-    /// together before each is differentiated alone: stages of models that are too large to be
-    /// differentiated side by side may still be found so.
+    /// Returns the number of intervals per group for an output, and the number of intervals that
+    /// are simulated together before each is differentiated alone: models that are too large to be
+    /// differentiated in SIMD lanes may still be simulated in them.
     fn group_sizes<R: BatchOutput<I::Model, I::Number>>(&self) -> [usize; 2] {
         let lacks_start_values =
             I::IS_ITERATIVE && self.options.start == Start::Given && self.start_values.is_none();

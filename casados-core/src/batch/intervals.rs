@@ -1,4 +1,4 @@
-//! What a batch is given.
+//! The inputs of a batch.
 
 use super::error::{BatchError, Slice};
 use crate::error::{Argument, Error};
@@ -8,10 +8,11 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape, copy};
 use bytemuck::Zeroable;
 
-/// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there
-/// may be one element for all of them instead.
+/// Many intervals of one model. Each slice has one element for each interval; all but `x0` may have
+/// one element for all of them instead.
 ///
-/// What a program says begins with `..Default::default()`, which is no interval at all.
+/// Programs set some fields and take the others from `..Default::default()`, which has empty
+/// slices.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -29,7 +30,7 @@ use bytemuck::Zeroable;
 /// ```
 #[derive(Debug)]
 pub struct Intervals<'a, M: Dae, T: Plain = f64> {
-    /// States at the start: as many as there are intervals.
+    /// Initial states, one for each interval: their number is the number of intervals.
     pub x0: &'a [VectorX<M, T>],
     /// Controls; may be empty if the model has none.
     pub u: &'a [VectorU<M, T>],
@@ -37,37 +38,37 @@ pub struct Intervals<'a, M: Dae, T: Plain = f64> {
     pub p: &'a [VectorP<M, T>],
     /// Lengths of the intervals.
     pub h: &'a [T],
-    /// Times at their starts; zero if empty.
+    /// Times at the starts of the intervals; zero if empty.
     pub t0: &'a [T],
 }
 
 copy!(['a, M: Dae, T: Plain] Intervals<'a, M, T>);
 
-/// No interval at all: what is there is set in it.
+/// No intervals; the default for fields that are not set.
 impl<M: Dae, T: Plain> Default for Intervals<'_, M, T> {
     fn default() -> Self {
         Self { x0: &[], u: &[], p: &[], h: &[], t0: &[] }
     }
 }
 
-/// One of them.
+/// One interval.
 #[derive(Debug)]
 pub struct Interval<'a, M: Dae, T: Plain> {
     pub x0: &'a VectorX<M, T>,
-    /// Empty if the model has none, as `p`.
+    /// Empty if the model has none; so is `p`.
     pub u: &'a [T],
     pub p: &'a [T],
     pub h: T,
     pub t0: T,
-    /// Empty if nobody asks for adjoints.
+    /// Empty without adjoints.
     pub lambda: &'a [T],
-    /// Weights of the algebraic states at the start; empty if there are none.
+    /// Weights of the initial algebraic states; empty without them.
     pub nu: &'a [T],
 }
 
 copy!(['a, M: Dae, T: Plain] Interval<'a, M, T>);
 
-/// All that a call was given, of the right lengths.
+/// The inputs of a call, with checked lengths.
 pub struct BatchInputs<'a, M: Dae, T: Plain> {
     intervals: &'a Intervals<'a, M, T>,
     lambda: Option<&'a [VectorX<M, T>]>,
@@ -75,6 +76,8 @@ pub struct BatchInputs<'a, M: Dae, T: Plain> {
 }
 
 impl<'a, M: Dae, T: Real> BatchInputs<'a, M, T> {
+    /// Checks the lengths of all slices.
+    ///
     /// # Errors
     /// [`BatchError::Length`]
     pub fn new(
@@ -107,12 +110,12 @@ impl<'a, M: Dae, T: Real> BatchInputs<'a, M, T> {
         Ok(Self { intervals, lambda, nu })
     }
 
-    /// How many intervals there are.
+    /// Returns the number of intervals.
     pub fn len(&self) -> usize {
         self.intervals.x0.len()
     }
 
-    /// One interval.
+    /// Returns one interval.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]
@@ -141,12 +144,12 @@ impl<'a, M: Dae, T: Real> BatchInputs<'a, M, T> {
     }
 }
 
-/// The element of an interval, which may be that of all.
+/// Returns the element of an interval, or the element for all intervals.
 fn interval_element<V>(slice: &[V], index: usize) -> Option<&V> {
     if slice.len() == 1 { slice.first() } else { slice.get(index) }
 }
 
-/// A vector of these elements.
+/// Converts elements to a vector.
 pub fn vector<T: Plain, V: Matrix<T> + Zeroable>(elements: &[T]) -> V {
     let mut vector = V::zeroed();
     for (to, from) in vector.as_mut_slice().iter_mut().zip(elements) {

@@ -1,4 +1,4 @@
-//! Numbers of several intervals in the lanes of registers, and back.
+//! Packs numbers of several intervals into SIMD lanes, and unpacks them.
 
 pub(super) use crate::erk::MaskedResult;
 use crate::linalg::{Arithmetic, Kernel, kernels};
@@ -6,17 +6,17 @@ use crate::scalar::Lanes;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 
-/// More lanes than any register has.
+/// Upper bound of the lanes of a register.
 pub const MAX_LANES: usize = 16;
 
-/// True in every lane.
+/// Returns a mask that is true in every lane.
 #[inline(always)]
 pub fn all_lanes_true<E: Lanes>() -> E::Mask {
     E::le(E::from_f64(0.0), E::from_f64(0.0))
 }
 
 kernels! {
-    /// The elements of several slices, one of each in the lanes of a register.
+    /// Packs elements of several slices into the lanes of registers.
     pub fn pack [T: Plain, E: Lanes<Cell: AsMut<[T]>>] [T, E] <A>(
         from: &'k [&'k [T]; MAX_LANES],
         to: &'k mut [E],
@@ -33,8 +33,8 @@ kernels! {
     }
 }
 
-/// The elements of registers, those of each lane in a slice of their own, which may be empty. One
-/// function for all fields of all models.
+/// Unpacks registers: each lane goes to its own slice, which may be empty. One function for all
+/// fields of all models.
 pub struct Unpack<'a, 'b, T, E> {
     pub from: &'a [E],
     pub to: &'a mut [&'b mut [T]; MAX_LANES],
@@ -53,7 +53,7 @@ impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, '_, T, E> {
             let Some(tile) = tile.get_mut(..E::LANES) else { return };
             E::transpose(from, tile);
             for (to, cell) in to.iter_mut().zip(&*tile) {
-                // As many as the optimiser knows.
+                // The constant length removes bounds checks.
                 if let Some(to) = to.get_mut(begin..begin + E::LANES) {
                     to.copy_from_slice(cell.as_ref());
                 }

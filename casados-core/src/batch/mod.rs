@@ -1,20 +1,19 @@
-//! Many intervals of one model at once, as multiple shooting wants them.
+//! Batches: many intervals of one model at once, as in multiple shooting.
 //!
-//! Intervals `(x₀, u, p, λ)` of a horizon do not depend on each other. So each of them gets a lane
-//! of the widest registers that the machine has, and all lanes go through the same engine as a
-//! single call: the model, stages, elimination, derivatives. Results are written into the caller's
-//! slice.
+//! The intervals `(x₀, u, p, λ)` of a horizon are independent. Each has one lane of the widest SIMD
+//! registers of the machine, and all lanes are computed by the engine of a single call: the model,
+//! stages, elimination, derivatives. Results are written to the caller's slice.
 //!
-//! Every lane is judged by itself. An interval whose iteration did not converge in its group, whose
-//! derivatives do not satisfy their equations, or which met a value that is not finite, is computed
-//! again alone, with all that a single call can do: the whole matrix pivoted, and an error that
-//! says what is wrong. Within a group of an implicit method the Jacobian is renewed as the slowest
-//! lane needs it: so neighbours change a result by rounding errors. Of an explicit method they
-//! change nothing.
+//! Every lane has its own status. If the iteration of an interval does not converge in its group,
+//! its derivatives do not satisfy their equations, or a value is not finite, the interval is
+//! recomputed alone with the full functionality of a single call: the dense fallback, and detailed
+//! errors. A group of an implicit method updates its Jacobian for the slowest lane, so that
+//! neighbours change results by rounding errors. Neighbours have no effect with explicit methods.
 //!
-//! One file for each thing: `intervals` what is given, `answer` what is asked, `single` what
-//! integrates an interval alone or several in `lanes`, `implicit` and `explicit` the methods that
-//! do, `work` who computes what, `integrator` what users see.
+//! Modules: `intervals` are the inputs, `batch_output` the outputs, `single` integrates one
+//! interval or a group in `lanes`, `implicit` and `explicit` implement it for the methods, `chunk`
+//! and `worker` distribute the work, `group_call` computes one group, `integrator` is the public
+//! interface.
 
 mod batch_output;
 mod chunk;
@@ -47,19 +46,19 @@ use crate::tableau::{
 };
 
 /// The integrator of many intervals, of the method `B` for the model `M`, with numbers `T`:
-/// `Batch<Model, Gauss<4>>`, or `Batch<Model, Rk4>` of an explicit model.
+/// `Batch<Model, Gauss<4>>`, or `Batch<Model, Rk4>` for an explicit model.
 ///
-/// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, which [`Intervals`] lists; each is
-/// integrated as [`Irk`] does, or [`Erk`] of an explicit method, side by side in registers and,
-/// with the feature `parallel`, over threads. Results are written into the caller's slice, an
-/// element for each.
+/// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, listed in [`Intervals`]. Each is
+/// integrated as by [`Irk`], or by [`Erk`] for an explicit method; groups of them are computed in
+/// SIMD lanes and, with the feature `parallel`, on several threads. Results are written to the
+/// caller's slice, one element for each.
 ///
-/// `Batch<Model, Custom<S>>` takes implicit tableaux of one's own, and explicit ones as if they
-/// were implicit; `batch::Integrator<Erk<Model, Custom<S>>>` takes explicit ones as they are.
-/// `batch::Integrator<Irk<Model, Gauss<2>, f64, Shared>>` takes the kernels that all models share
+/// `Batch<Model, Custom<S>>` takes user-defined implicit tableaux, and treats explicit ones as
+/// implicit; `batch::Integrator<Erk<Model, Custom<S>>>` takes explicit tableaux.
+/// `batch::Integrator<Irk<Model, Gauss<2>, f64, Shared>>` uses the kernels that all models share
 /// ([`Shared`](crate::memory::Shared)), one interval after the other.
 ///
-/// It is an [`Integrator`], whose page has all that it can do:
+/// It is an [`Integrator`], with these functions:
 ///
 /// | | |
 /// | --- | --- |
@@ -69,12 +68,12 @@ use crate::tableau::{
 /// | [`forward`](Integrator::forward) | and derivatives by `(x₀, u, p)` |
 /// | [`adjoint`](Integrator::adjoint), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients of `λᵀx₊`, alone or with derivatives |
 /// | [`hessian`](Integrator::hessian), [`hessian_with_z0`](Integrator::hessian_with_z0) | and second derivatives, of `λᵀx₊` or `λᵀx₊ + νᵀz₀` |
-/// | [`status`](Integrator::status) | what happened to an interval |
-/// | [`statistics`](Integrator::statistics) | what the last call did |
+/// | [`status`](Integrator::status) | outcome of an interval |
+/// | [`statistics`](Integrator::statistics) | statistics of the last call |
 ///
 /// # Errors
-/// [`BatchError`]: slices of wrong lengths before anything is computed; afterwards, how many
-/// intervals failed, each for itself. An interval that fails leaves its result as it was.
+/// [`BatchError`]: slices of wrong lengths before anything is computed; otherwise the number of
+/// failed intervals, each with its own error. The result of a failed interval remains unchanged.
 ///
 /// # Example
 /// ```
@@ -109,7 +108,7 @@ use crate::tableau::{
 /// ```
 pub type Batch<M, B, T = f64> = Integrator<<B as Batched<M, T>>::Single>;
 
-/// A method that a batch of the model `M` takes, with numbers `T`: implicit ones for every model,
+/// A method of a batch for the model `M` with numbers `T`: implicit methods for every model,
 /// explicit ones for explicit models.
 ///
 /// ```

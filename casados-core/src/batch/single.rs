@@ -1,4 +1,4 @@
-//! What integrates intervals: one of them alone, and several side by side.
+//! Integrators of batches: for a single interval, and for a group in SIMD lanes.
 
 use super::intervals::Interval;
 use super::lanes::{MAX_LANES, MaskedResult, pack};
@@ -13,10 +13,10 @@ use crate::shape::Plain;
 use crate::statistics::Statistics;
 use core::any::Any;
 
-/// An integrator that a batch is made of: [`Irk`](crate::Irk) and [`Erk`](crate::Erk) with memory
-/// on the heap. It integrates intervals one at a time, and knows what integrates several at once.
+/// An integrator of single intervals for batches: [`Irk`](crate::Irk) and [`Erk`](crate::Erk) with
+/// memory on the heap. Its type `Group` integrates several intervals at once.
 ///
-/// Its methods are for the batch.
+/// Its methods are used by the batch.
 ///
 /// ```
 /// use casados::batch::{Integrator, Single};
@@ -42,53 +42,54 @@ pub trait Single:
 {
     /// The method.
     type Method;
-    /// The tableau of a method.
+    /// The tableau of the method.
     type Tableau: Copy + Send + Sync;
-    /// What is remembered of a step.
+    /// The stored stages of a step.
     #[doc(hidden)]
     type Stages: Plain;
-    /// What integrates several intervals side by side, one in each lane.
+    /// The integrator of a group, with one interval in each lane.
     #[doc(hidden)]
     type Group<E: Lanes<Cell: AsRef<[Self::Number]> + AsMut<[Self::Number]>>>: Group<Self, E>;
 
-    /// Whether stages are found by iterations: then start values matter, and those that were found
-    /// before.
+    /// Whether stages are computed by iterations, which start from start values or from the stages
+    /// of earlier calls.
     #[doc(hidden)]
     const IS_ITERATIVE: bool;
-    /// Whether there are groups.
+    /// Whether groups are supported.
     #[doc(hidden)]
     const SUPPORTS_GROUPS: bool;
 
-    /// An integrator with a tableau.
+    /// Returns an integrator for a tableau.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`], and those of a tableau that does not fit.
+    /// [`Error::InvalidOption`], and errors of an unsuitable tableau.
     #[doc(hidden)]
     fn of(options: &Options, tableau: &Self::Tableau) -> Result<Self, Error>;
-    /// Bytes that are fetched again and again of a group: with so many columns of derivatives.
+    /// Returns the working set of a group in bytes, with `columns` columns of derivatives.
     #[doc(hidden)]
     fn working_set<E: Lanes>(options: &Options, columns: usize) -> usize;
 
-    /// Start values `ẋ` and `z`.
+    /// Sets start values `ẋ` and `z`.
     ///
     /// # Errors
     /// Those of the setter.
     #[doc(hidden)]
     fn give(&mut self, given: [&[Self::Number]; 2]) -> Result<(), Error>;
-    /// Where stages begin: at those of an earlier call, which may be solutions; or anew.
+    /// Sets the initial guess of the stages: those of an earlier call, which may be solutions, or
+    /// `None`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
     fn start(&mut self, stages: Option<&[Self::Stages]>, reuses_solutions: bool) -> Result<(), Error>;
-    /// The stages of the last call.
+    /// Copies the stages of the last call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
     fn stages(&mut self, to: &mut [Self::Stages]) -> Result<(), Error>;
 
-    /// Derivatives, where they belong.
+    /// Computes derivatives into a result.
     ///
     /// # Errors
     /// Those of a single call.
@@ -98,7 +99,7 @@ pub trait Single:
         at: &IntervalOf<'_, Self>,
         to: &mut Forward<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
-    /// The same with gradients.
+    /// Computes derivatives and gradients into a result.
     ///
     /// # Errors
     /// Those of a single call.
@@ -108,7 +109,7 @@ pub trait Single:
         at: &IntervalOf<'_, Self>,
         to: &mut ForwardAdjoint<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
-    /// The same with second derivatives.
+    /// Computes derivatives, gradients and second derivatives into a result.
     ///
     /// # Errors
     /// Those of a single call.
@@ -141,14 +142,14 @@ type IntervalOf<'a, I> = Interval<'a, <I as Integrator>::Model, <I as Integrator
 /// # Ok::<(), Error>(())
 /// ```
 pub trait Standard: Single {
-    /// That one.
+    /// The tableau of the method.
     const TABLEAU: Self::Tableau;
 }
 
-/// What integrates several intervals side by side.
+/// Integrates the intervals of a group.
 pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
     fn new(options: &Options, tableau: &I::Tableau) -> Self;
-    /// Puts an interval into each lane; `given` are start values, and `stages` those of earlier
+    /// Loads an interval into each lane. `given` are start values; `stages` are those of earlier
     /// calls, if all lanes have them, which may be solutions.
     ///
     /// # Errors
@@ -160,12 +161,12 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
         stages: Option<&[&[I::Stages]; MAX_LANES]>,
         reuses_solutions: bool,
     ) -> Result<(), Error>;
-    /// The stages of a lane in the last call.
+    /// Copies the stages of a lane in the last call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn copy_stages(&mut self, lane: usize, to: &mut [I::Stages]) -> Result<(), Error>;
-    /// What the last call did.
+    /// Returns the statistics of the last call.
     fn statistics(&self) -> Statistics;
 
     fn solve(&mut self) -> MaskedResult<'_, E, Nominal<I::Model, E>>;
@@ -175,8 +176,7 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
     fn hessian(&mut self) -> MaskedResult<'_, E, Hessian<I::Model, E>>;
 }
 
-/// The group of integrators that take one interval after the other ([`Single::SUPPORTS_GROUPS`]): nobody
-/// asks it for anything.
+/// The group of integrators without groups ([`Single::SUPPORTS_GROUPS`]), which is never called.
 pub struct NoGroup;
 
 impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
@@ -223,7 +223,7 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
     }
 }
 
-/// Numbers of each interval, in the lanes of registers.
+/// Gathers numbers of all intervals into SIMD lanes.
 pub fn gather<M: Dae, T: Plain, E: Lanes<Cell: AsMut<[T]>>>(
     intervals: &[&Interval<'_, M, T>],
     to: &mut [E],

@@ -1,8 +1,8 @@
-//! What the last call did.
+//! Statistics of batches.
 
 use crate::statistics::Statistics;
 
-/// What the last call did.
+/// Statistics of the last call of a batch.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -22,17 +22,17 @@ use crate::statistics::Statistics;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BatchStatistics {
-    /// How many times several intervals were computed side by side.
+    /// Number of groups that were computed in SIMD lanes.
     pub groups: usize,
-    /// Intervals that were computed alone from the beginning, or differentiated alone after their
-    /// stages were found side by side.
+    /// Number of intervals that were computed alone from the start, or differentiated alone after a
+    /// simulation in a group.
     pub alone: usize,
-    /// Intervals that were computed alone after the group did not arrive at a trustworthy result,
-    /// or at stages, for them.
+    /// Number of intervals that were recomputed alone, after the result or the simulation of their
+    /// group was not accepted.
     pub redone: usize,
-    /// Intervals without a result.
+    /// Number of intervals without a result.
     pub failed: usize,
-    /// What was done for groups and single intervals together: an iteration of a group counts once.
+    /// Total work of groups and single intervals: an iteration of a group counts once.
     pub work: Statistics,
 }
 

@@ -1,5 +1,5 @@
-//! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a
-//! result for.
+//! Distribution of the work: intervals in groups, groups on threads, and intervals alone if their
+//! group has no result for them.
 
 use super::batch_output::BatchOutput;
 use super::chunk::{BatchTask, IntervalChunk, Sink, try_resize};
@@ -19,7 +19,7 @@ use crate::shape::{Shape, copy_into};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// How many threads share the intervals, unless somebody says so.
+/// The default number of threads.
 pub fn default_threads() -> usize {
     #[cfg(feature = "parallel")]
     return rayon::current_num_threads();
@@ -27,7 +27,7 @@ pub fn default_threads() -> usize {
     1
 }
 
-/// Gives every thread as many groups as every other.
+/// Distributes groups evenly over the threads.
 #[cfg(feature = "parallel")]
 pub fn run_parallel<I: Single, R: BatchOutput<I::Model, I::Number>>(
     task: &BatchTask<'_, I>,
@@ -59,18 +59,17 @@ pub fn run_parallel<I: Single, R: BatchOutput<I::Model, I::Number>>(
     Ok(())
 }
 
-/// How many numbers fill registers of 32 bytes: so few intervals take less time there than in wider
-/// ones.
+/// Lanes of a register of 32 bytes: for no more intervals it is faster than wider registers.
 const fn avx2_lanes<T>() -> usize {
     32 / size_of::<T>()
 }
 
-/// What computes, with memory of its own.
+/// A worker of one thread, with its own memory.
 pub struct Worker<I: Single> {
     single: I,
-    /// A [`Group`] for each kind of register: results of several kinds may need different ones.
+    /// A [`Group`](super::single::Group) for each register type: modes may need different ones.
     groups: GroupCache,
-    /// Stages of the steps of intervals that are simulated together, and where they lead.
+    /// Stages of intervals that are simulated together, and their final states.
     stages: Vec<I::Stages>,
     end_states: Vec<Nominal<I::Model, I::Number>>,
     pub statistics: BatchStatistics,
@@ -81,7 +80,7 @@ impl<I: Single> Worker<I> {
         Ok(Self::from_single(I::of(options, tableau)?))
     }
 
-    /// The same with memory of its own.
+    /// Returns a worker with the same settings and its own memory.
     pub fn clone_settings(&self) -> Self {
         Self::from_single(self.single.clone())
     }
@@ -108,8 +107,8 @@ impl<I: Single> Worker<I> {
         }
     }
 
-    /// Shows results to `sink`, up to the first interval that fails. There is memory for those of
-    /// one group, or of one interval where no group is differentiated.
+    /// Passes results to `sink`, up to the first failed interval. `chunk.results` holds one group,
+    /// or one interval if no group is differentiated.
     pub fn for_each_result<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,
@@ -130,7 +129,7 @@ impl<I: Single> Worker<I> {
         }
     }
 
-    /// The intervals of one group; those with a result are shown to `sink`.
+    /// Computes the intervals of one group; passes those with a result to `sink`.
     #[inline(never)]
     fn compute_group<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
@@ -151,7 +150,7 @@ impl<I: Single> Worker<I> {
         if has_several && task.lanes > 1 {
             let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut chunk);
             let group_call = GroupCall { task, groups, statistics, intervals: &intervals, chunk: share };
-            // What did not get memory side by side may get it alone.
+            // If the group cannot be allocated, intervals are computed alone.
             let lanes =
                 if count > avx2_lanes::<I::Number>() { task.lanes } else { avx2_lanes::<I::Number>() };
             let lanes = lanes.min(task.lanes);
@@ -184,7 +183,7 @@ impl<I: Single> Worker<I> {
         }
     }
 
-    /// The stages of all intervals of a group, for those that arrive.
+    /// Simulates a group; returns the intervals whose stages were found.
     fn simulate<R>(
         &mut self,
         task: &BatchTask<'_, I>,
@@ -213,7 +212,7 @@ impl<I: Single> Worker<I> {
         I::Number::run_in_widest_register(task.simulation_lanes, group_call).ok().and_then(Result::ok)
     }
 
-    /// One interval; its stages may be known.
+    /// Computes one interval; `is_solved` is whether its stages are known.
     fn compute_single<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,

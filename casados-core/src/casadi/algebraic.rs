@@ -1,11 +1,12 @@
-//! Algebraic states at the end of an interval, `ζ(x, u, p)` of the state there, and the chain rule:
+//! Algebraic states `ζ(x, u, p)` at the end of an interval, as functions of the state there, and
+//! the chain rule:
 //!
 //! ```text
 //! d(ζ)/dw = ζ_x X + (0, ζ_u, ζ_p)        ∇(νᵀζ) = Dᵀ ∇_(x, u, p)(νᵀζ)        ∇²(νᵀζ) = Dᵀ ∇²_(x, u, p)(νᵀζ) D + terms of ∇²x
 //! ```
 //!
-//! with `X = dx/dw` and `D = (X, (0, I, 0), (0, 0, I))`. The terms of `∇²x` are those of the
-//! multipliers `λ + ζ_xᵀν` of the state.
+//! with `X = dx/dw` and `D = (X, (0, I, 0), (0, 0, I))`. The terms of `∇²x` have the multipliers
+//! `λ + ζ_xᵀν` of the state.
 
 use super::interval::Consistent;
 use super::second::Blocks;
@@ -26,7 +27,7 @@ pub fn add_to_seed(sizes: OutputDimensions, zeta: &Consistent, nu: &[f64], lambd
     }
 }
 
-/// Adds what controls and parameters change of `νᵀζ` directly to the gradient.
+/// Adds the direct derivatives of `νᵀζ` with respect to controls and parameters to the gradient.
 pub fn add_to_gradient(sizes: OutputDimensions, zeta: &Consistent, nu: &[f64], gradient: &mut [f64]) {
     let columns = gradient.iter_mut().zip(zeta.jacobian.chunks_exact(sizes.nz));
     for (gradient, column) in columns.skip(sizes.nx) {
@@ -34,7 +35,7 @@ pub fn add_to_gradient(sizes: OutputDimensions, zeta: &Consistent, nu: &[f64], g
     }
 }
 
-/// Writes the rows of `ζ`, which are behind those of the state.
+/// Writes the rows of `ζ`, which follow those of the state.
 pub fn write_jacobian(sizes: OutputDimensions, zeta: &Consistent, jacobian: &mut [f64]) {
     let OutputDimensions { nx, nz, ny, .. } = sizes;
     for (w, column) in jacobian.chunks_exact_mut(ny).enumerate() {
@@ -46,7 +47,7 @@ pub fn write_jacobian(sizes: OutputDimensions, zeta: &Consistent, jacobian: &mut
     }
 }
 
-/// Adds `Dᵀ ∇²(νᵀζ) D` to the Hessian, where `X` are the first rows of the Jacobian.
+/// Adds `Dᵀ ∇²(νᵀζ) D` to the Hessian; `X` are the first rows of the Jacobian.
 pub fn add_to_hessian(
     sizes: OutputDimensions,
     blocks: Blocks,
@@ -67,7 +68,7 @@ pub fn add_to_hessian(
         let product: alloc::vec::Vec<f64> = (0..nw).map(row).collect();
         for a in 0..=b {
             let value: f64 = column(a).zip(&product).map(|(d, product)| d * product).sum();
-            // Blocks on the diagonal have both triangles.
+            // Diagonal blocks have both triangles.
             let [place, mirrored] = [blocks.index(a, b), blocks.index(b, a)];
             hessian[place] += value;
             if place != mirrored {

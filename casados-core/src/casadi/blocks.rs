@@ -1,4 +1,4 @@
-//! What functions of integrators want, and how results become their outputs.
+//! The inputs and outputs of the functions of integrators.
 
 use super::cache::{IntervalResults, Part, equal};
 use super::function::{Call, Port, Signature};
@@ -8,17 +8,18 @@ use crate::model::Dae;
 use crate::result::{Adjoint, Forward, Hessian};
 use crate::shape::{Matrix, Shape};
 
-/// `(x₀, u, p)`, the first three inputs.
+/// Reads `(x₀, u, p)`, the first three inputs.
 pub fn read_inputs(signature: &Signature, call: &dyn Call, to: &mut [f64]) {
     read(signature.inputs.iter().enumerate().take(3), call, to);
 }
 
-/// The multipliers of the outputs, which follow the nominal outputs among the inputs of adjoints.
+/// Reads the multipliers of the outputs, which follow the nominal outputs among the inputs of
+/// adjoints.
 pub fn read_multipliers(signature: &Signature, call: &dyn Call, to: &mut [f64]) {
     read(signature.inputs.iter().enumerate().filter(|(_, port)| signature::is_seed(port)), call, to);
 }
 
-/// Inputs, one behind the other.
+/// Reads inputs one after the other.
 fn read<'a>(inputs: impl Iterator<Item = (usize, &'a Port)>, call: &dyn Call, to: &mut [f64]) {
     let mut rest = to;
     for (input, port) in inputs {
@@ -29,19 +30,19 @@ fn read<'a>(inputs: impl Iterator<Item = (usize, &'a Port)>, call: &dyn Call, to
     }
 }
 
-/// What the wanted outputs are made of.
+/// The results that the requested outputs require.
 #[derive(Clone, Copy)]
 pub struct WantedDerivatives {
     pub value: bool,
     pub jacobian: bool,
     pub gradient: bool,
     pub hessian: bool,
-    /// Whether algebraic states are among values, and in the Jacobian.
+    /// Whether algebraic states are required, as values and in the Jacobian.
     pub algebraic: [bool; 2],
 }
 
 impl WantedDerivatives {
-    /// What a call wants.
+    /// The results required by a call.
     pub fn by(outputs: &[Output], call: &dyn Call) -> Self {
         let wants = |source| {
             outputs.iter().enumerate().any(|(index, output)| {
@@ -62,12 +63,12 @@ impl WantedDerivatives {
         }
     }
 
-    /// Whether nothing is wanted.
+    /// Whether no output is requested.
     pub fn is_empty(&self) -> bool {
         !(self.value || self.jacobian || self.gradient || self.hessian)
     }
 
-    /// Whether all of it is known, for these multipliers.
+    /// Whether all of it is in the cache entry, for these multipliers.
     pub fn is_in<T>(&self, answer: &IntervalResults<T>, lambda: &[f64]) -> bool {
         let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
         (!self.value || answer.value.get().is_some())
@@ -78,8 +79,7 @@ impl WantedDerivatives {
     }
 }
 
-/// The numbers that outputs are made of: of each source as blocks that count as one behind the
-/// other. What is not there is empty.
+/// The numbers of outputs: for each source several blocks, in order. Missing results are empty.
 #[derive(Clone, Copy, Default)]
 pub struct ResultBlocks<'a> {
     pub value: [&'a [f64]; 1],
@@ -89,7 +89,7 @@ pub struct ResultBlocks<'a> {
 }
 
 impl<'a> ResultBlocks<'a> {
-    /// Those of an answer.
+    /// The blocks of a cache entry.
     pub fn of<T>(answer: &'a IntervalResults<T>) -> Self {
         let of = |part: &'a Part| part.get().map_or(&[][..], |values| values);
         Self {
@@ -100,7 +100,7 @@ impl<'a> ResultBlocks<'a> {
         }
     }
 
-    /// The block that has this place of a source, and the place where the block begins.
+    /// The block that contains the element `place` of a source, and the index of its first element.
     fn block(&self, source: Source, place: usize) -> (&'a [f64], usize) {
         let blocks = match source {
             Source::Value => &self.value[..],
@@ -120,7 +120,7 @@ impl<'a> ResultBlocks<'a> {
     }
 }
 
-/// The outputs that are wanted. Each has its numbers in one block.
+/// Writes the requested outputs. The numbers of each output are in one block.
 pub fn write(numbers: &ResultBlocks<'_>, outputs: &[Output], call: &mut dyn Call) {
     for (index, Output { source, runs, .. }) in outputs.iter().enumerate() {
         let Some(run) = runs.first() else { continue };
@@ -144,7 +144,7 @@ pub fn write(numbers: &ResultBlocks<'_>, outputs: &[Output], call: &mut dyn Call
     }
 }
 
-/// Blocks, one behind the other.
+/// Copies blocks one after the other.
 pub fn concatenate(blocks: &[&[f64]], to: &mut [f64]) {
     let mut rest = to;
     for block in blocks {
@@ -164,7 +164,8 @@ pub fn hessian_gradient_blocks<M: Dae>(result: &Hessian<M>) -> [&[f64]; 3] {
     [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()]
 }
 
-/// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
+/// Writes blocks of `count` rows, next to each other, to the rows from `first` on of a matrix with
+/// `rows` rows.
 pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
     if count > 0 && count == rows {
         concatenate(&blocks, to);
@@ -176,7 +177,7 @@ pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &m
     }
 }
 
-/// The rows of the states in a matrix of `ny` rows.
+/// Writes the rows of the states in a matrix of `ny` rows.
 pub fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
     rows(jacobian_blocks(result), M::Shape::NX, 0, ny, to);
 }
@@ -186,7 +187,7 @@ pub fn jacobian_blocks<M: Dae>(result: &Forward<M>) -> [&[f64]; 3] {
     [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()]
 }
 
-/// Where those of a model are.
+/// The layout of second derivatives of a model.
 pub fn second<M: Dae>() -> Blocks {
     Blocks([M::Shape::NX, M::Shape::NU, M::Shape::NP])
 }

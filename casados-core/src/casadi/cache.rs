@@ -1,19 +1,18 @@
-//! Results of the last inputs: nominal values, derivatives and stages that were asked for once are
-//! there for whoever asks next.
+//! A cache of results: values, derivatives and stages for the last inputs.
 //!
-//! IPOPT asks for all constraints, then for their Jacobian, then for the Hessian at the same
-//! iterate, each by a graph of its own over the same intervals. So there is an entry for each of
-//! the inputs, found by their bits.
+//! IPOPT requests all constraints, then their Jacobian, then the Hessian at the same iterate, each
+//! by its own graph over the same intervals. There is one entry for each of the inputs, found by
+//! their bits.
 //!
-//! Where stages are known, derivatives are computed without solving for anything, and hardly
-//! anybody asks for the same ones twice. So they are kept from when somebody does: memory that was
-//! touched hundreds of inputs ago is slower to write than a Jacobian is to copy.
+//! With known stages, derivatives require no solve, and are rarely requested twice. They are
+//! therefore stored only after a repeated request: writing to memory that has left the CPU cache
+//! costs more than copying a Jacobian.
 
 use alloc::vec::Vec;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// Values, if they were computed. Their memory stays.
+/// Values, if computed. Their memory is reused.
 #[derive(Clone, Debug, Default)]
 pub struct Part<V = Vec<f64>> {
     values: V,
@@ -21,18 +20,18 @@ pub struct Part<V = Vec<f64>> {
 }
 
 impl<V> Part<V> {
-    /// The values, if they were computed.
+    /// The values, if computed.
     pub fn get(&self) -> Option<&V> {
         self.valid.then_some(&self.values)
     }
 
-    /// A place for values.
+    /// Marks the values as computed and returns their storage.
     pub fn open(&mut self) -> &mut V {
         self.valid = true;
         &mut self.values
     }
 
-    /// Forgets the values.
+    /// Discards the values.
     pub fn clear(&mut self) {
         self.valid = false;
     }
@@ -45,7 +44,7 @@ impl<V> Part<V> {
 }
 
 impl Part {
-    /// A place for this number of values, which are all to be written.
+    /// Returns storage for this number of values, all of which must be written.
     pub fn set(&mut self, len: usize) -> &mut [f64] {
         let values = self.open();
         values.resize(len, 0.0);
@@ -53,14 +52,14 @@ impl Part {
     }
 }
 
-/// What is known about an interval of these inputs.
+/// The results for an interval with given inputs.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalResults<T> {
     /// `y`
     pub value: Part,
     /// `∂y/∂w`, column by column.
     pub jacobian: Part,
-    /// Of what the next two are derivatives: `λ`.
+    /// The multipliers `λ` of the next two.
     pub lambda: Part,
     /// `∇(λᵀy)`
     pub gradient: Part,
@@ -68,12 +67,12 @@ pub struct IntervalResults<T> {
     pub hessian: Part,
     /// The stages.
     pub tape: Part<T>,
-    /// Whether values and Jacobian have algebraic states.
+    /// Whether values and Jacobian include algebraic states.
     pub algebraic: [bool; 2],
 }
 
 impl<T> IntervalResults<T> {
-    /// Forgets everything.
+    /// Discards all results.
     pub fn clear(&mut self) {
         for part in
             [&mut self.value, &mut self.jacobian, &mut self.lambda, &mut self.gradient, &mut self.hessian]
@@ -84,7 +83,7 @@ impl<T> IntervalResults<T> {
         self.algebraic = [false; 2];
     }
 
-    /// Takes values and stages that another one knows about the same inputs.
+    /// Takes values and stages of another result for the same inputs.
     fn merge_stages(&mut self, other: &mut Self) {
         if other.value.valid {
             self.algebraic[0] = other.algebraic[0];
@@ -93,7 +92,7 @@ impl<T> IntervalResults<T> {
         self.tape.swap_if_missing(&mut other.tape);
     }
 
-    /// Takes what another one knows about the same inputs.
+    /// Takes all results of another one for the same inputs.
     fn merge(&mut self, other: &mut Self) {
         for (part, is_new) in [other.value.valid, other.jacobian.valid].into_iter().enumerate() {
             if is_new {
@@ -113,16 +112,16 @@ impl<T> IntervalResults<T> {
     }
 }
 
-/// The answers to the last inputs.
+/// The results for the last inputs.
 #[derive(Debug)]
 pub struct Cache<T> {
     entries: Vec<Entry<T>>,
-    /// Where the entry of a key is.
+    /// The index of the entry of each key.
     places: HashMap<u64, usize, BuildHasherDefault<PrecomputedHash>>,
     capacity: usize,
-    /// The oldest entry, if there are as many as may be.
+    /// The oldest entry, once the capacity is reached.
     oldest: usize,
-    /// Whether derivatives are kept, too.
+    /// Whether derivatives are stored.
     derivatives: bool,
 }
 
@@ -134,22 +133,22 @@ struct Entry<T> {
     given: ComputedDerivatives,
 }
 
-/// Derivatives that were computed, whether they were kept or not.
+/// The derivatives that were computed, stored or not.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ComputedDerivatives {
     pub jacobian: bool,
-    /// The key of the multipliers of those of second order.
+    /// The key of the multipliers of second-order derivatives.
     pub second: Option<u64>,
 }
 
 impl<T: Default> Cache<T> {
-    /// A cache of at most this number of entries, which have their memory from when they are
-    /// needed; of derivatives from the start, or from when some are asked for a second time.
+    /// A cache with at most this number of entries, allocated on demand; derivatives are stored
+    /// from the start, or after a repeated request.
     pub fn new(capacity: usize, derivatives: bool) -> Self {
         Self { entries: Vec::new(), places: HashMap::default(), capacity, oldest: 0, derivatives }
     }
 
-    /// What is known about these inputs, whose [`key`] this is.
+    /// The results for inputs with this [`key`].
     pub fn find(&self, key: u64, inputs: &[f64]) -> Option<&IntervalResults<T>> {
         self.entry(key, inputs).map(|entry| &entry.answer)
     }
@@ -158,13 +157,14 @@ impl<T: Default> Cache<T> {
         self.entries.get(*self.places.get(&key)?).filter(|entry| equal(&entry.inputs, inputs))
     }
 
-    /// Whether derivatives are kept.
+    /// Whether derivatives are stored.
     pub fn keeps_derivatives(&self) -> bool {
         self.derivatives
     }
 
-    /// Derivatives at these inputs are wanted that are not there, the Jacobian or those of second
-    /// order for some multipliers: if they were computed before, derivatives are kept from now on.
+    /// Records a request for derivatives that are not stored: the Jacobian, or second-order
+    /// derivatives for multipliers. If they were computed before, derivatives are stored from now
+    /// on.
     pub fn record_miss(&mut self, key: u64, inputs: &[f64], jacobian: bool, lambda: Option<&[f64]>) {
         if self.derivatives {
             return;
@@ -174,8 +174,8 @@ impl<T: Default> Cache<T> {
         self.derivatives = again || jacobian && given.jacobian;
     }
 
-    /// Takes what is to be kept about these inputs, and leaves some other memory in its place. The
-    /// oldest inputs are forgotten if there is no place. `given` is what was asked for.
+    /// Stores results for these inputs, and swaps other memory into their place. At capacity the
+    /// oldest inputs are replaced. `given` are the derivatives that were computed.
     pub fn store(
         &mut self,
         key: u64,
@@ -186,7 +186,7 @@ impl<T: Default> Cache<T> {
         if self.capacity == 0 {
             return;
         }
-        // An entry of another key has other inputs. These are not read: their memory is far away.
+        // An entry with another key has other inputs, which are not read, to avoid cache misses.
         let (place, same) = match self.places.get(&key) {
             Some(&place) => (place, self.entry(key, inputs).is_some()),
             None if self.entries.len() < self.capacity => {
@@ -220,13 +220,13 @@ impl<T: Default> Cache<T> {
     }
 }
 
-/// Whether bits are the same: zeros of both signs are two inputs.
+/// Whether the bits are equal: positive and negative zero differ.
 pub fn equal(one: &[f64], other: &[f64]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-/// What inputs are found by: four products side by side, and the finaliser of `splitmix64`
-/// (S. Vigna, public domain).
+/// The hash of inputs: four interleaved products, and the finaliser of `splitmix64` (S. Vigna,
+/// public domain).
 pub fn key(inputs: &[f64]) -> u64 {
     let mut lanes: [u64; 4] =
         [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03, 0xaef1_7502_108e_f2d9, 0xf135_7aea_2e62_a9c5];
@@ -243,7 +243,7 @@ pub fn key(inputs: &[f64]) -> u64 {
     })
 }
 
-/// What has a hash already.
+/// Returns a precomputed hash.
 #[derive(Debug, Default)]
 struct PrecomputedHash(u64);
 

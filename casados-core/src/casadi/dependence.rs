@@ -1,52 +1,51 @@
-//! Which derivatives of the end of an interval may differ from zero: what the graph of a model
-//! knows, followed over stages and steps.
+//! Structural dependence of the end of an interval: the sparsity of the model's graph, propagated
+//! over stages and steps.
 //!
-//! The unknown `ẋ_j` or `z_j` is matched with an equation that contains it, so that no equation is
-//! matched twice. It depends on what that equation contains, and this on what it depends on in
-//! turn: the entries of `A⁻¹ B` that differ from zero for general values of the entries of `A` and
-//! `B` (J. R. Gilbert, "Predicting structure in sparse matrix computations", SIAM J. Matrix Anal.
-//! Appl. 15, 1994). A state depends on its derivative, within a step by the tableau and from step
-//! to step.
+//! Each unknown `ẋ_j` or `z_j` is matched with an equation that contains it (a perfect matching).
+//! It depends on the variables of that equation, and recursively on their dependencies: the
+//! non-zeros of `A⁻¹ B` for general entries of `A` and `B` (J. R. Gilbert, "Predicting structure in
+//! sparse matrix computations", SIAM J. Matrix Anal. Appl. 15, 1994). A state depends on its
+//! derivative, within a step by the tableau and from step to step.
 
 use super::sparsity::Dependence;
 use crate::structure::Pattern;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The numbers of states, of algebraic states, and of directions `w = (x₀, u, p)` of a model.
+/// The numbers of states, algebraic states and directions `w = (x₀, u, p)` of a model.
 #[derive(Clone, Copy, Debug)]
 pub struct Dimensions {
-    /// States.
+    /// The number of states.
     pub nx: usize,
-    /// Algebraic states.
+    /// The number of algebraic states.
     pub nz: usize,
-    /// States, controls and parameters.
+    /// The number of states, controls and parameters.
     pub nw: usize,
 }
 
 impl Dimensions {
-    /// Those of a model.
+    /// The dimensions of a model.
     pub const fn of<M: crate::model::Dae>() -> Self {
         use crate::shape::Shape;
         Self { nx: M::Shape::NX, nz: M::Shape::NZ, nw: M::Shape::NW }
     }
 
-    /// The variable that an unknown `(ẋ, z)` is.
+    /// The index of an unknown `(ẋ, z)` among the variables.
     const fn variable(self, unknown: usize) -> usize {
         if unknown < self.nx { unknown } else { self.nx + unknown }
     }
 }
 
-/// Of which of the directions `w = (x₀, u, p)` the variables `(ẋ, x, z, u, p)` depend; `jacobian`
-/// has the non-zeros of the model's.
+/// The directions `w = (x₀, u, p)` on which the variables `(ẋ, x, z, u, p)` depend; `jacobian` has
+/// the non-zeros of the model's Jacobian.
 ///
-/// `depth` is the number of evaluations of the model that come one after the other in an explicit
-/// method, each of which leads one equation further. In an implicit one each depends on all, and
-/// what holds at a stage holds at the end.
+/// `depth` is the number of successive model evaluations of an explicit method, each of which
+/// propagates dependencies by one equation. In an implicit method all stages depend on each other,
+/// and the end has the dependencies of the stages.
 pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>) -> Dependence {
     let Dimensions { nx, nz, nw } = dimensions;
     let mut relation = Dependence::zero(nx + nz + nw, nw);
-    // States, controls and parameters are themselves.
+    // States, controls and parameters depend on themselves.
     for direction in 0..nx {
         relation.set(nx + direction, direction);
     }
@@ -83,15 +82,15 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
     relation
 }
 
-/// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are
-/// those of second derivatives by the variables.
+/// The entries of the Hessian of any `λᵀy` with respect to `w` that may be non-zero, given the
+/// second derivatives with respect to the variables.
 pub fn curvature(variables: &Dependence, second: Pattern, hessian: &mut Dependence) {
     for (one, other) in second.iter() {
         hessian.add_row_products(variables, one, other);
     }
 }
 
-/// An equation for each unknown `(ẋ, z)`, by augmenting paths; none if there is no perfect
+/// Matches an equation with each unknown `(ẋ, z)` by augmenting paths; none if there is no perfect
 /// matching.
 fn match_equations(Dimensions { nx, nz, .. }: Dimensions, jacobian: Pattern) -> Vec<Option<usize>> {
     let nk = nx + nz;
@@ -113,7 +112,7 @@ fn match_equations(Dimensions { nx, nz, .. }: Dimensions, jacobian: Pattern) -> 
     equation_of
 }
 
-/// Finds an unknown for an equation, and other ones for those it takes them from.
+/// Matches an equation with an unknown, and rematches other equations along an augmenting path.
 fn augment(
     equation: usize,
     unknowns_of: &[Vec<usize>],

@@ -1,67 +1,67 @@
-//! Matrices of a problem as sums of numbers of its stages: the lists by which they are written.
+//! The matrices of a problem as sums of entries of its stages.
 
 use super::sparsity::Sparsity;
 use alloc::vec::Vec;
 
-/// A number that is added to an entry: where it is among those of a stage, or its value.
+/// A term of an entry: the position of a number in a stage, or a constant.
 #[derive(Clone, Copy, Debug)]
 pub enum EntryTerm {
-    /// A number of a block of an interval.
+    /// A number in a block of an interval.
     Interval {
-        /// The stage at its start.
+        /// The stage at the start of the interval.
         stage: usize,
-        /// Which of the blocks: see [`Blocks`].
+        /// The block: see [`Blocks`].
         block: usize,
-        /// The place in it.
+        /// The index in the block.
         index: usize,
     },
-    /// A number of the matrix at a node.
+    /// A number in the matrix of a node.
     Node {
         /// The stage.
         stage: usize,
-        /// The place in its matrix.
+        /// The index in its matrix.
         index: usize,
     },
     /// A constant.
     Constant(f64),
 }
 
-/// Derivatives of an interval, column after column: those of its end by `x` and `u`, and the blocks
-/// `xx`, `xu` and `uu` of second derivatives. What was not asked for is empty.
+/// The derivatives of an interval in column-major order: those of its end with respect to `x` and
+/// `u`, and the blocks `xx`, `xu` and `uu` of second derivatives. Derivatives that were not
+/// requested are empty.
 pub type Blocks<'a> = [&'a [f64]; 5];
 
-/// A number that is added to an entry, with the row and the column of this.
+/// A term with the row and the column of its entry.
 pub type Term = ([usize; 2], EntryTerm);
 
-/// A matrix as a sum: what is added to which entry. First come the numbers of all intervals, then
-/// those of nodes and constants.
+/// A matrix as a sum of terms: first those of all intervals, then those of nodes and constants.
 #[derive(Debug, Default)]
 pub struct MatrixSum {
-    /// The entries.
+    /// The sparsity pattern.
     pub sparsity: Sparsity,
-    /// Numbers of each interval.
+    /// The terms of each interval.
     intervals: Vec<Vec<StridedEntries>>,
-    /// Numbers of the matrix at each node.
+    /// The terms of the matrix at each node.
     nodes: Vec<Vec<StridedEntries>>,
     constants: Vec<Constant>,
 }
 
-/// Entries one behind the other, whose numbers are at equal distances.
+/// Successive entries whose numbers are at equal distances.
 #[derive(Debug)]
 struct StridedEntries {
     /// The first entry.
     entry: u32,
-    /// Where its number is.
+    /// The position of its number.
     block: u32,
     place: u32,
-    /// How far the next one is.
+    /// The distance to the next number.
     stride: u32,
     count: u32,
-    /// Whether these entries have earlier numbers, to which these are added.
+    /// Whether the numbers are added to earlier terms.
     adds: bool,
 }
 
-/// An entry that has a constant, besides other numbers or alone.
+/// An entry with a constant, alone or besides other terms.
 #[derive(Debug)]
 struct Constant {
     entry: u32,
@@ -70,7 +70,7 @@ struct Constant {
 }
 
 impl StridedEntries {
-    /// Takes the next entry, if it is where the run goes on.
+    /// Appends the next entry, if it continues the run.
     fn try_append(&mut self, next: &Self) -> bool {
         let Some(stride) = next.place.checked_sub(self.place + self.stride * (self.count - 1)) else {
             return false;
@@ -83,7 +83,7 @@ impl StridedEntries {
         true
     }
 
-    /// Its entries, times `factor`, out of its block.
+    /// Writes the entries, `factor` times numbers of the block.
     fn write(&self, block: &[f64], factor: f64, to: &mut [f64]) {
         let &Self { entry, place, stride, count, adds, .. } = self;
         let to = &mut to[entry as usize..(entry + count) as usize];
@@ -102,14 +102,14 @@ impl StridedEntries {
 }
 
 impl MatrixSum {
-    /// The matrix of these terms.
+    /// The matrix with these terms.
     pub fn new(rows: usize, columns: usize, mut terms: Vec<Term>) -> Self {
         let rank = |slot| match slot {
             EntryTerm::Interval { .. } => 0,
             EntryTerm::Node { .. } => 1,
             EntryTerm::Constant(_) => 2,
         };
-        // Those of stages stay in order.
+        // The order of stages is kept.
         terms.sort_by_key(|&([row, column], slot)| (column, row, rank(slot)));
         let mut entries: Vec<(usize, usize)> = Vec::new();
         let mut matrix = Self::default();
@@ -140,15 +140,15 @@ impl MatrixSum {
         matrix
     }
 
-    /// The numbers of an interval, times `factor`.
+    /// Writes the terms of an interval, times `factor`.
     pub fn write_interval(&self, stage: usize, blocks: &Blocks<'_>, factor: f64, to: &mut [f64]) {
         for run in self.intervals.get(stage).into_iter().flatten() {
             run.write(blocks.get(run.block as usize).copied().unwrap_or_default(), factor, to);
         }
     }
 
-    /// The numbers of the matrices at all nodes and constants, times `factor`, after those of
-    /// intervals.
+    /// Adds the terms of the matrices at all nodes and the constants, times `factor`, after those
+    /// of intervals.
     pub fn write_nodes<'a>(&self, matrices: impl Iterator<Item = &'a [f64]>, factor: f64, to: &mut [f64]) {
         for (matrix, runs) in matrices.zip(&self.nodes) {
             runs.iter().for_each(|run| run.write(matrix, factor, to));
@@ -159,7 +159,7 @@ impl MatrixSum {
         }
     }
 
-    /// Makes the numbers of the matrix at a node zero.
+    /// Sets the terms of the matrix at a node to zero.
     pub fn zero_node_terms(&self, stage: usize, matrix: &mut [f64]) {
         for &StridedEntries { place, stride, count, .. } in self.nodes.get(stage).into_iter().flatten() {
             let places = matrix[place as usize..].iter_mut().step_by(stride as usize);

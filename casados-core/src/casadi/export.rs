@@ -1,11 +1,11 @@
-//! What users write: the macro that exports the functions of an integrator.
+//! The macros that export the functions of an integrator.
 
 /// Exports an integrator to CasADi: the functions `name`, `jac_name`, `adj1_name` and
-/// `jac_adj1_name` of a `cdylib`, which `casadi.external("name", "./lib….so")` finds; see
+/// `jac_adj1_name` of a `cdylib`, for `casadi.external("name", "./lib….so")`; see
 /// [`casadi`](crate::casadi).
 ///
-/// After the integrator and the length of its interval come, in this order and each if it is
-/// wanted, `quadrature = F`, whose integrals are the output `qf`, and fields of
+/// The integrator and the length of its interval may be followed, in this order, by
+/// `quadrature = F`, whose integrals are the output `qf`, and by fields of
 /// [`Settings`](crate::casadi::Settings).
 ///
 /// ```text
@@ -41,9 +41,9 @@ macro_rules! __casadi_export {
     };
 }
 
-/// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
-/// of a horizon, one after the other in time, in one call. `x0`, `u`, `p` and `xf` have a column
-/// for each. The last answers are remembered, two if `cache` says nothing else.
+/// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all
+/// successive intervals of a horizon in one call. `x0`, `u`, `p` and `xf` have one column for each.
+/// The results of the last two inputs are cached by default.
 ///
 /// ```text
 /// casados::casadi::export_horizon! {
@@ -72,11 +72,11 @@ macro_rules! __casadi_export_horizon {
     };
 }
 
-/// Exports a problem of optimal control to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")`
-/// solves it, with all of its derivatives computed in the library; see [`casadi`](crate::casadi).
+/// Exports an optimal control problem to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")` solves
+/// it, with all derivatives computed in the library; see [`casadi`](crate::casadi).
 ///
-/// That is the problem called `nlp`. Others of the same library have names of their own: they are
-/// functions `name`, `name_bounds`, `name_trajectory`, …, to be put together with others.
+/// This is the problem called `nlp`. Further problems of the same library have other names: they
+/// are functions `name`, `name_bounds`, `name_trajectory`, …, for larger problems.
 ///
 /// ```text
 /// fn swing() -> Result<impl Program, Box<dyn Error>> { … }
@@ -107,7 +107,7 @@ macro_rules! __casadi_export_problem {
             $crate::__casadi_function!(LIBRARY, 9, "adj1_", $name, "");
             $crate::__casadi_function!(LIBRARY, 10, "jac_adj1_", $name, "");
             $crate::__casadi_function!(LIBRARY, 11, "", $name, "_trajectory");
-            /// How many intervals were integrated, for tests.
+            /// The number of integrated intervals, for tests.
             #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
             extern "C" fn integrations() -> ::core::ffi::c_longlong {
                 $crate::casadi::ffi::integrations(&LIBRARY)
@@ -125,7 +125,7 @@ macro_rules! __casadi_functions {
         $crate::__casadi_function!($library, 1, "jac_", $name, "");
         $crate::__casadi_function!($library, 2, "adj1_", $name, "");
         $crate::__casadi_function!($library, 3, "jac_adj1_", $name, "");
-        /// How many intervals were integrated, for tests.
+        /// The number of integrated intervals, for tests.
         #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
         extern "C" fn integrations() -> ::core::ffi::c_longlong {
             $crate::casadi::ffi::integrations(&$library)
@@ -133,7 +133,7 @@ macro_rules! __casadi_functions {
     };
 }
 
-/// Exports one function of a library, with all that CasADi asks about it.
+/// Exports one function of a library, with its queries by CasADi.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __casadi_function {
@@ -149,7 +149,7 @@ macro_rules! __casadi_function {
                 _: *mut f64,
                 memory: c_int,
             ) -> c_int {
-                // SAFETY: the caller's promise is that of `ffi::evaluate`.
+                // SAFETY: the caller guarantees the conditions of `ffi::evaluate`.
                 unsafe { ffi::evaluate(&$library, $function, arguments, results, memory) }
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_n_in"))]
@@ -183,7 +183,7 @@ macro_rules! __casadi_function {
                 integers: *mut c_longlong,
                 numbers: *mut c_longlong,
             ) -> c_int {
-                // SAFETY: the caller's promise is that of `ffi::work`.
+                // SAFETY: the caller guarantees the conditions of `ffi::work`.
                 unsafe { ffi::work(&$library, $function, [arguments, results, integers, numbers]) }
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_checkout"))]
@@ -196,11 +196,11 @@ macro_rules! __casadi_function {
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_incref"))]
             extern "C" fn incref() {
-                ffi::refer(&$library);
+                ffi::add_reference(&$library);
             }
             #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_decref"))]
             extern "C" fn decref() {
-                ffi::forget(&$library);
+                ffi::remove_reference(&$library);
             }
         };
     };

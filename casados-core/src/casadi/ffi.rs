@@ -1,8 +1,8 @@
-//! The functions of a shared library that CasADi calls: pointers become a safe `Call`.
+//! The functions of a shared library that CasADi calls: converts pointers to a safe `Call`.
 //!
 //! CasADi's contract (`casadi/core/external_impl.hpp`): the pointers of a call are to as many
 //! arrays as there are inputs and outputs, each null or as long as its pattern has non-zeros;
-//! nobody else writes them during the call. Patterns and names are read as long as the function is
+//! nobody else writes them during the call. Patterns and names are read while the function is
 //! referred to.
 #![allow(unsafe_code)]
 
@@ -15,15 +15,15 @@ use core::ptr::null;
 use core::slice::{from_raw_parts, from_raw_parts_mut};
 use std::panic::catch_unwind;
 
-/// What CasADi takes for a failure that one can recover from.
+/// CasADi's status for a recoverable failure.
 const FAILED: c_int = 1;
 
-/// What is asked about the ports of a function.
+/// The kind of ports in a query.
 #[derive(Clone, Copy, Debug)]
 pub enum Side {
-    /// Inputs.
+    /// The inputs.
     Input,
-    /// Outputs.
+    /// The outputs.
     Output,
 }
 
@@ -41,12 +41,12 @@ impl Call for Pointers<'_> {
     fn read(&self, input: usize, to: &mut [f64]) {
         to.fill(0.0);
         let Some(port) = self.inputs.get(input).filter(|_| !self.arguments.is_null()) else { return };
-        // SAFETY: the index is one of an input, and there are as many pointers.
+        // SAFETY: the index is that of an input, and there are as many pointers.
         let argument = unsafe { *self.arguments.add(input) };
         if !argument.is_null() {
-            // SAFETY: what is not null is an array of as many numbers as the pattern has non-zeros,
-            // which nobody writes while this reference lives: it ends here, before any output is
-            // written.
+            // SAFETY: a non-null pointer is to an array of as many numbers as the pattern has
+            // non-zeros, which nobody writes while this reference exists: it ends here, before any
+            // output is written.
             let values = unsafe { from_raw_parts(argument, port.sparsity.entries().len()) };
             for (to, from) in to.iter_mut().zip(values) {
                 *to = *from;
@@ -55,7 +55,7 @@ impl Call for Pointers<'_> {
     }
 
     fn wants(&self, output: usize) -> bool {
-        // SAFETY: the index is one of an output, and there are as many pointers.
+        // SAFETY: the index is that of an output, and there are as many pointers.
         output < self.outputs.len()
             && !self.results.is_null()
             && !unsafe { *self.results.add(output) }.is_null()
@@ -66,9 +66,9 @@ impl Call for Pointers<'_> {
             return None;
         }
         let port = self.outputs.get(output)?;
-        // SAFETY: as in `wants`, which says that the pointer is not null; then it is to an array of
-        // as many numbers as the pattern has non-zeros, which nobody else reads or writes during
-        // the call. The result borrows `self`, so that there is no second reference.
+        // SAFETY: as in `wants`, which has tested that the pointer is not null; then it is to an
+        // array of as many numbers as the pattern has non-zeros, which nobody else reads or writes
+        // during the call. The result borrows `self`, so that there is no second reference.
         Some(unsafe { from_raw_parts_mut(*self.results.add(output), port.sparsity.entries().len()) })
     }
 }
@@ -116,8 +116,8 @@ pub fn name<C: FunctionLibrary>(
     name.flatten().unwrap_or(null())
 }
 
-/// `F_sparsity_in`, `F_sparsity_out`: null if there is no such port. The pointer is one to memory
-/// of the client, which lives until the last reference to the functions is gone.
+/// `F_sparsity_in`, `F_sparsity_out`: null if there is no such port. The pointer is to memory of
+/// the client, which lives until the last reference to the functions is dropped.
 pub fn sparsity<C: FunctionLibrary>(
     library: &Library<C>,
     function: usize,
@@ -129,7 +129,7 @@ pub fn sparsity<C: FunctionLibrary>(
     pattern.flatten().unwrap_or(null())
 }
 
-/// `F_work`: CasADi's memory is not needed, but for the pointers to inputs and outputs.
+/// `F_work`: only the arrays of pointers to inputs and outputs are needed.
 ///
 /// # Safety
 /// The pointers are null or to one number each, which nobody else reads or writes during the call.
@@ -140,7 +140,7 @@ pub unsafe fn work<C: FunctionLibrary>(
 ) -> c_int {
     let counts = [count(library, function, Side::Input), count(library, function, Side::Output), 0, 0];
     for (to, size) in sizes.into_iter().zip(counts) {
-        // SAFETY: what is not null is a pointer to one number that is ours during the call.
+        // SAFETY: a non-null pointer is to one number, to which this call has exclusive access.
         if let Some(to) = unsafe { to.as_mut() } {
             *to = size;
         }
@@ -148,7 +148,7 @@ pub unsafe fn work<C: FunctionLibrary>(
     0
 }
 
-/// `F_checkout`: a memory, or −1.
+/// `F_checkout`: the index of a memory, or −1.
 pub fn check_out<C: FunctionLibrary>(library: &Library<C>) -> c_int {
     catch_unwind(AssertUnwindSafe(|| library.check_out())).ok().flatten().unwrap_or(-1)
 }
@@ -159,17 +159,17 @@ pub fn release<C: FunctionLibrary>(library: &Library<C>, memory: c_int) {
 }
 
 /// `F_incref`
-pub fn refer<C: FunctionLibrary>(library: &Library<C>) {
-    let _ = catch_unwind(AssertUnwindSafe(|| library.refer()));
+pub fn add_reference<C: FunctionLibrary>(library: &Library<C>) {
+    let _ = catch_unwind(AssertUnwindSafe(|| library.add_reference()));
 }
 
 /// `F_decref`
-pub fn forget<C: FunctionLibrary>(library: &Library<C>) {
-    let _ = catch_unwind(AssertUnwindSafe(|| library.forget()));
+pub fn remove_reference<C: FunctionLibrary>(library: &Library<C>) {
+    let _ = catch_unwind(AssertUnwindSafe(|| library.remove_reference()));
 }
 
-/// How many intervals were integrated since somebody referred to the functions first; those of no
-/// length too, where algebraic states are found.
+/// The number of intervals integrated since the first reference to the functions, including those
+/// of length zero for algebraic states.
 pub fn integrations<C: FunctionLibrary>(library: &Library<C>) -> c_longlong {
     catch_unwind(AssertUnwindSafe(|| {
         library.client().map_or(0, |client| client.integrations() as c_longlong)
@@ -181,7 +181,7 @@ fn port(ports: &[Port], index: c_longlong) -> Option<&Port> {
     ports.get(usize::try_from(index).ok()?)
 }
 
-/// What a function has to say about its ports; none after a panic.
+/// Queries the ports of a function; none after a panic.
 fn with<C: FunctionLibrary, R>(
     library: &Library<C>,
     function: usize,

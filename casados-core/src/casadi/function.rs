@@ -1,4 +1,4 @@
-//! A function as CasADi sees it: names and patterns of its inputs and outputs.
+//! The signature of a function for CasADi: names and patterns of its inputs and outputs.
 
 use super::sparsity::Sparsity;
 use alloc::borrow::Cow;
@@ -15,27 +15,27 @@ pub struct Port {
 }
 
 impl Port {
-    /// A port of this name with these non-zeros.
+    /// A port with this name and these non-zeros.
     pub fn new(name: impl Into<Cow<'static, CStr>>, sparsity: Sparsity) -> Self {
         Self { name: name.into(), sparsity }
     }
 }
 
-/// Inputs and outputs of a function.
+/// The inputs and outputs of a function.
 #[derive(Clone, Debug, Default)]
 pub struct Signature {
-    /// What it takes.
+    /// The inputs.
     pub inputs: Vec<Port>,
-    /// What it gives.
+    /// The outputs.
     pub outputs: Vec<Port>,
 }
 
-/// The arguments of a call and the places of its results.
+/// The arguments of a call, and the storage of its results.
 pub trait Call {
     /// Copies the non-zeros of an input; zeros if it is not given.
     fn read(&self, input: usize, to: &mut [f64]);
-    /// Whether an output is wanted.
+    /// Whether an output is requested.
     fn wants(&self, output: usize) -> bool;
-    /// The non-zeros of an output, if it is wanted.
+    /// The storage for the non-zeros of an output, if requested.
     fn output(&mut self, output: usize) -> Option<&mut [f64]>;
 }

@@ -1,4 +1,4 @@
-//! States and controls by the names that the model gives them.
+//! Groups of states and controls by their names in the model.
 
 use crate::qp::StageDims;
 use alloc::ffi::CString;
@@ -6,27 +6,27 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// States or controls of one name, `x_q` of `x.q[0]`, `x.q[1]`, ….
+/// The states or controls of one name: `x_q` for `x.q[0]`, `x.q[1]`, ….
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group {
     /// The name, with letters, digits and underscores.
     pub name: CString,
     /// Whether these are controls.
     pub controls: bool,
-    /// Which of the states or controls they are.
+    /// The indices of the states or controls.
     pub rows: Range<usize>,
 }
 
 impl Group {
-    /// Where they are among the variables of a stage.
+    /// The indices among the variables of a stage.
     pub fn variable_range(&self, dims: &StageDims) -> Range<usize> {
         let (first, count) = if self.controls { (dims.nx, dims.nu) } else { (0, dims.nx) };
         first + self.rows.start.min(count)..first + self.rows.end.min(count)
     }
 }
 
-/// The groups of states and of controls with these names; those without a name of their own, `x[0]`
-/// or `u[0]`, are in none.
+/// The groups of states and of controls; names without a part of their own, `x[0]` or `u[0]`, have
+/// no group.
 pub fn groups(names: [&[&str]; 2]) -> Vec<Group> {
     let mut groups = Vec::<Group>::new();
     for (controls, names) in [false, true].into_iter().zip(names) {
@@ -47,7 +47,7 @@ pub fn groups(names: [&[&str]; 2]) -> Vec<Group> {
     groups
 }
 
-/// Letters and digits, with one underscore for what is between them.
+/// Keeps letters and digits, with one underscore for everything between them.
 fn identifier(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("_")

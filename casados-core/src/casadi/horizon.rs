@@ -1,5 +1,5 @@
-//! A batch as the functions of one integrator, of all intervals of a horizon at once: `x0`, `u`,
-//! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
+//! A batch as the functions of one integrator, for all intervals of a horizon in one call: `x0`,
+//! `u`, `p` and `xf` have one column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{
     ResultBlocks, WantedDerivatives, adjoint_gradient_blocks, concatenate, hessian_gradient_blocks, jacobian,
@@ -28,15 +28,15 @@ use std::sync::{Mutex, PoisonError};
 /// An integrator of many intervals: `Batch` of `f64`.
 #[doc(hidden)]
 pub trait Horizon: Sized + Send + 'static {
-    /// Its model.
+    /// The model.
     type Model: Dae;
 
-    /// An integrator with these options.
+    /// Creates an integrator with these options.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
     fn build(options: &Options) -> Result<Self, Error>;
-    /// Computes what is wanted.
+    /// Computes the requested results.
     ///
     /// # Errors
     /// Those of the integrator, with the interval.
@@ -120,10 +120,10 @@ pub struct Horizons<B: Horizon> {
     batch: PhantomData<fn() -> B>,
 }
 
-/// What a thread has to itself.
+/// The memory of a thread.
 pub struct Worker<B: Horizon> {
     batch: B,
-    /// `x₀` of all intervals, then `u`, then `p`; and the multipliers `λ`.
+    /// `x₀` of all intervals, followed by `u` and `p`; and the multipliers `λ`.
     inputs: Vec<f64>,
     lambda: Vec<f64>,
     answer: IntervalResults<()>,
@@ -134,13 +134,13 @@ impl<B: Horizon> Horizons<B> {
     const NU: usize = <<B::Model as Dae>::Shape as Shape>::NU;
     const NW: usize = <<B::Model as Dae>::Shape as Shape>::NW;
 
-    /// The functions of this number of intervals with these settings.
+    /// The functions for this number of intervals with these settings.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], in words
+    /// A text for [`Error::OutOfMemory`].
     pub fn new(settings: Settings<Options>, count: usize) -> Result<Self, CallFailure> {
         let (nx, nu, nw) = (Self::NX, Self::NU, Self::NW);
-        // Patterns of four functions have about so many indices, not asked for one by one.
+        // The approximate size of the indices in the patterns of four functions, tested in advance.
         let bytes =
             (nx + nw).saturating_mul(nx + nw).saturating_mul(4 * size_of::<usize>()).saturating_mul(count);
         if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {

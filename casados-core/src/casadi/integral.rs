@@ -1,4 +1,4 @@
-//! Integrals along the solution as a further output.
+//! Integrals along the solution as an additional output.
 
 use super::dependence;
 use super::sparsity::Dependence;
@@ -13,25 +13,25 @@ use core::marker::PhantomData;
 /// The integrals of all outputs of a function, or none.
 #[doc(hidden)]
 pub trait Integral<M: Dae>: 'static {
-    /// How many.
+    /// The number of integrals.
     const COUNT: usize;
-    /// Memory of them.
+    /// Their memory.
     type Memory: Send;
 
-    /// Memory for a thread.
+    /// The memory for a thread.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     fn memory() -> Result<Self::Memory, Error>;
-    /// What the integrator takes along, with these multipliers.
-    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64>;
+    /// The integrand, with these multipliers.
+    fn integrand<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64>;
     /// The values.
     fn value(memory: &Self::Memory) -> &[f64];
-    /// The derivatives by `x₀`, `u` and `p`, each column by column.
+    /// The derivatives with respect to `x₀`, `u` and `p`, each in column-major order.
     fn jacobian(memory: &Self::Memory) -> [&[f64]; 3];
-    /// On which directions the outputs depend (in rows from `first` on), and where the Hessian of
-    /// them has entries, if these are the variables at the stages.
-    fn depend(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence);
+    /// The directions on which the outputs depend (in rows from `first` on), and the entries of
+    /// their Hessian, given the dependencies of the variables at the stages.
+    fn add_dependence(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence);
 }
 
 /// No integrals.
@@ -46,7 +46,7 @@ impl<M: Dae> Integral<M> for Nothing {
     fn memory() -> Result<(), Error> {
         Ok(())
     }
-    fn along<'a>((): &'a mut (), _: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
+    fn integrand<'a>((): &'a mut (), _: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
         None
     }
     fn value((): &()) -> &[f64] {
@@ -55,7 +55,7 @@ impl<M: Dae> Integral<M> for Nothing {
     fn jacobian((): &()) -> [&[f64]; 3] {
         [&[]; 3]
     }
-    fn depend(_: &Dependence, _: usize, _: &mut Dependence, _: &mut Dependence) {}
+    fn add_dependence(_: &Dependence, _: usize, _: &mut Dependence, _: &mut Dependence) {}
 }
 
 /// The integrals of all outputs of a function `F`.
@@ -73,7 +73,7 @@ where
     fn memory() -> Result<Self::Memory, Error> {
         Quadrature::boxed()
     }
-    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
+    fn integrand<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
         memory.nu.as_mut_slice().copy_from_slice(nu);
         Some(&mut **memory)
     }
@@ -83,7 +83,12 @@ where
     fn jacobian(memory: &Self::Memory) -> [&[f64]; 3] {
         [memory.dq_dx0.as_slice(), memory.dq_du.as_slice(), memory.dq_dp.as_slice()]
     }
-    fn depend(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence) {
+    fn add_dependence(
+        variables: &Dependence,
+        first: usize,
+        value: &mut Dependence,
+        hessian: &mut Dependence,
+    ) {
         for (output, variable) in F::STRUCTURE.jacobian.iter() {
             value.add_row(first + output, variables, variable);
         }

@@ -1,7 +1,7 @@
 //! One integrator as the functions `F`, `jac_F`, `adj1_F` and `jac_adj1_F`.
 //!
 //! With `w = (x₀, u, p)` and the outputs `y = (x, z, q)` they are `y`, `∂y/∂w`, `∇(λᵀy)`, and the
-//! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
+//! derivatives of `∇(λᵀy)`: `∇²(λᵀy)` with respect to `w` and `(∂y/∂w)ᵀ` with respect to `λ`.
 
 use super::algebraic::{self, OutputDimensions};
 use super::blocks::{
@@ -26,34 +26,35 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What can be chosen about the functions of an integrator.
+/// Settings of the functions of an integrator.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Settings<O> {
-    /// The length of the interval; of a negative one the model runs backwards in time.
+    /// The length of the interval; if negative, the model runs backwards in time.
     pub interval: f64,
     /// The options of the integrator.
     pub options: O,
-    /// The time at the start; zero by default.
+    /// The time at the start. Default zero.
     pub time: f64,
-    /// Whether the algebraic states at the end are the output `zf`; not by default.
+    /// Whether the algebraic states at the end are the output `zf`. Default false.
     pub algebraic: bool,
-    /// How many inputs are remembered with what was computed at them; 512 by default. As many as a
-    /// problem has intervals are needed, or none is found again.
+    /// The number of inputs whose results are cached. Default 512. The cache is effective only if
+    /// it has at least as many entries as the problem has intervals.
     pub cache: usize,
-    /// `(x₀, u, p)` at which an adaptive integrator chooses the steps that all calls then take.
-    /// None by default.
+    /// The point `(x₀, u, p)` at which an adaptive integrator chooses the steps of all calls.
+    /// Default empty.
     pub steps_at: &'static [f64],
 }
 
 impl<O: Default> Settings<O> {
-    /// The defaults, for an interval of this length.
+    /// The defaults for an interval of this length.
     #[must_use]
     pub fn new(interval: f64) -> Self {
         Self { interval, options: O::default(), time: 0.0, algebraic: false, cache: 512, steps_at: &[] }
     }
 
-    /// Whether the interval has a length: one without ends where it begins, whatever the model is.
+    /// Checks the length of the interval: with length zero the end would equal the start for every
+    /// model.
     pub(super) fn check(&self) -> Result<(), CallFailure> {
         if self.interval == 0.0 { Err(CallFailure("`interval` has no length".into())) } else { Ok(()) }
     }
@@ -70,7 +71,7 @@ pub struct Integrators<I: Interval, Q = Nothing> {
     integrals: PhantomData<fn() -> Q>,
 }
 
-/// What a thread has to itself.
+/// The memory of a thread.
 pub struct Worker<I: Interval, Q: Integral<I::Model>> {
     integrator: I,
     integrals: Q::Memory,
@@ -78,9 +79,9 @@ pub struct Worker<I: Interval, Q: Integral<I::Model>> {
     inputs: Vec<f64>,
     lambda: Vec<f64>,
     answer: IntervalResults<I::Tape>,
-    /// Whether the cache keeps derivatives.
+    /// Whether the cache stores derivatives.
     keeps: bool,
-    /// Algebraic states at the end.
+    /// The algebraic states at the end.
     zeta: Consistent,
 }
 
@@ -90,7 +91,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     const NW: usize = <<I::Model as Dae>::Shape as Shape>::NW;
     const NZ: usize = <<I::Model as Dae>::Shape as Shape>::NZ;
 
-    /// Dimensions, with the algebraic states that are outputs.
+    /// The dimensions, including algebraic states that are outputs.
     const fn sizes(settings: &Settings<I::Options>) -> OutputDimensions {
         let nz = if settings.algebraic { Self::NZ } else { 0 };
         OutputDimensions { nx: Self::NX, nz, nw: Self::NW, ny: Self::NX + nz + Q::COUNT }
@@ -102,7 +103,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let (OutputDimensions { nx, nz, nw, ny }, nu) = (Self::sizes(&settings), Self::NU);
         let at =
             |depth| dependence::variables(Dimensions::of::<I::Model>(), I::Model::STRUCTURE.jacobian, depth);
-        // The last evaluation of an explicit method is at a point that does not depend on it.
+        // The point of an explicit method's last evaluation does not depend on that evaluation.
         let depth = I::depth(&settings.options);
         let (end, stages) = (at(depth), at(depth.map(|depth| depth.saturating_sub(1))));
         let (mut value, mut hessian) = (Dependence::zero(ny, nw), Dependence::zero(nw, nw));
@@ -113,7 +114,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             value.add_row(nx + output, &end, 2 * nx + output);
         }
         dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian);
-        Q::depend(&stages, nx + nz, &mut value, &mut hessian);
+        Q::add_dependence(&stages, nx + nz, &mut value, &mut hessian);
         let outputs = [0..nx, nx..nx + nz, nx + nz..ny];
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
         let shape = signature::Shape { count: 1, inputs, outputs, value: &value, hessian: &hessian };
@@ -123,7 +124,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         Self { settings, signatures, outputs, cache, integrations, integrals: PhantomData }
     }
 
-    /// Takes what is known from the cache: whether that is enough.
+    /// Loads results from the cache; returns whether they suffice.
     fn load_cached(
         &self,
         worker: &mut Worker<I, Q>,
@@ -149,7 +150,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         false
     }
 
-    /// Parameters, and stages that are known; without any the next call is one more integration.
+    /// Sets parameters and known stages; without stages the next call counts as an integration.
     fn prepare_integrator(
         &self,
         integrator: &mut I,
@@ -160,7 +161,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             integrator.set_parameters(&vector(p))?;
         }
         match tape {
-            Some(tape) => Ok(integrator.restore(tape)?),
+            Some(tape) => Ok(integrator.restore_stages(tape)?),
             None => {
                 self.integrations.fetch_add(1, Ordering::Relaxed);
                 Ok(())
@@ -168,7 +169,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         }
     }
 
-    /// Computes what is wanted, from stages that are known if there are any, and writes it.
+    /// Computes and writes the requested outputs, from known stages if available.
     fn compute(
         &self,
         worker: &mut Worker<I, Q>,
@@ -188,7 +189,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let adjoint = wanted.gradient || wanted.hessian;
         let algebraic = wanted.algebraic.contains(&true) || adjoint && nu.iter().any(|&nu| nu != 0.0);
         if algebraic && adjoint {
-            // What the state is multiplied by depends on where it ends.
+            // The multipliers of the state depend on the end of the interval.
             let end = integrator.solve(&point.x0, &point.u, point.h)?.x;
             record_tape(integrator, &mut answer.tape)?;
             self.algebraic_states_at_end(
@@ -199,10 +200,11 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             )?;
             algebraic::add_to_seed(sizes, zeta, nu, seed.as_mut_slice());
             if let Some(tape) = answer.tape.get() {
-                integrator.restore(tape)?;
+                integrator.restore_stages(tape)?;
             }
         }
-        // With algebraic states and integrals outputs have more than the integrator's own results.
+        // With algebraic states or integrals the outputs are more than the integrator's own
+        // results.
         let whole = !algebraic && Q::COUNT == 0;
         let asked = IntervalRequest {
             point: &point,
@@ -213,7 +215,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             sizes,
             outputs: if whole { outputs } else { &[] },
         };
-        asked.of(integrator, Q::along(integrals, of_integrals), answer, call)?;
+        asked.of(integrator, Q::integrand(integrals, of_integrals), answer, call)?;
         record_tape(integrator, &mut answer.tape)?;
         if adjoint {
             answer.lambda.set(ny).copy_from_slice(lambda);
@@ -248,7 +250,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         Ok(())
     }
 
-    /// Algebraic states at the end of the interval.
+    /// Computes the algebraic states at the end of the interval.
     fn algebraic_states_at_end(
         &self,
         integrator: &mut I,
@@ -264,22 +266,22 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     }
 }
 
-/// What an integrator is asked.
+/// A request to an integrator.
 struct IntervalRequest<'a, M: Dae> {
     point: &'a IntervalStart<M>,
     seed: &'a VectorX<M, f64>,
     wanted: WantedDerivatives,
-    /// Whether derivatives are to be in the answer.
+    /// Whether derivatives are copied to the cache entry.
     copies: bool,
-    /// Whether the Jacobian is, too, where it is computed for the Hessian.
+    /// Whether the Jacobian is also copied if it is computed for the Hessian.
     keeps: bool,
     sizes: OutputDimensions,
-    /// The outputs that the results are written to.
+    /// The outputs to be written.
     outputs: &'a [Output],
 }
 
 impl<M: Dae> IntervalRequest<'_, M> {
-    /// Writes outputs, and the answer: values, and derivatives if they are to be there.
+    /// Writes outputs and the cache entry: values, and derivatives if requested.
     fn of<I: Interval<Model = M>>(
         &self,
         integrator: &mut I,
@@ -323,9 +325,9 @@ impl<M: Dae> IntervalRequest<'_, M> {
     }
 }
 
-/// Keeps the stages of the last call, if nobody has.
+/// Records the stages of the last call, unless they are recorded.
 fn record_tape<I: Interval>(integrator: &mut I, tape: &mut Part<I::Tape>) -> Result<(), CallFailure> {
-    if tape.get().is_none() && !integrator.record(tape.open())? {
+    if tape.get().is_none() && !integrator.record_stages(tape.open())? {
         tape.clear();
     }
     Ok(())
@@ -359,7 +361,11 @@ impl<I: Interval, Q: Integral<I::Model>> FunctionLibrary for Integrators<I, Q> {
             if !p.is_empty() {
                 integrator.set_parameters(&vector(p))?;
             }
-            integrator.choose(&IntervalStart { x0: vector(x0), u: vector(u), h: self.settings.interval })?;
+            integrator.choose_steps(&IntervalStart {
+                x0: vector(x0),
+                u: vector(u),
+                h: self.settings.interval,
+            })?;
         }
         Ok(Worker {
             integrator,
@@ -392,8 +398,8 @@ impl<I: Interval, Q: Integral<I::Model>> FunctionLibrary for Integrators<I, Q> {
         if self.load_cached(worker, key, &wanted, outputs, call) {
             return Ok(());
         }
-        // Stages that were not taken by a call that was refused are not those of the next one.
-        self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.forget())?;
+        // After an error the restored stages must not be used in the next call.
+        self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.discard_stages())?;
         let adjoint = wanted.gradient || wanted.hessian;
         let given = ComputedDerivatives {
             jacobian: wanted.jacobian,

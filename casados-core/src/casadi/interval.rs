@@ -1,4 +1,4 @@
-//! What is asked of an integrator beside its calls, whichever it is.
+//! The interface of an integrator beyond its calls.
 
 use crate::adaptive::{self, AdaptiveOptions};
 use crate::batch::vector;
@@ -17,33 +17,32 @@ use bytemuck::Zeroable;
 /// An integrator of one interval: `Irk`, `Erk` and `Adaptive` of `f64` on the heap.
 #[doc(hidden)]
 pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'static {
-    /// What can be chosen about it.
+    /// Its options.
     type Options: Default + Clone + Send + Sync + 'static;
     /// The stages of all steps.
     type Tape: Default + Clone + Send + 'static;
 
-    /// An integrator with these options.
+    /// Creates an integrator with these options.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
     fn build(options: &Self::Options) -> Result<Self, Error>;
-    /// How many evaluations of the model come one after the other, if that is a number that no
-    /// equation can change.
+    /// The number of successive model evaluations, if it is independent of the equations.
     fn depth(options: &Self::Options) -> Option<usize>;
     /// Whether steps have to be chosen before the first call: see [`Interval::choose`].
     const CHOOSES: bool = false;
-    /// Chooses the steps of all following calls.
+    /// Chooses the steps of all later calls.
     ///
     /// # Errors
     /// Those of the integrator.
-    fn choose(&mut self, at: &IntervalStart<Self::Model>) -> Result<(), Error> {
+    fn choose_steps(&mut self, at: &IntervalStart<Self::Model>) -> Result<(), Error> {
         let _ = at;
         Ok(())
     }
-    /// Whether it finds algebraic states that are consistent with a state.
+    /// Whether it computes algebraic states that are consistent with a state.
     const FINDS_ALGEBRAIC_STATES: bool = false;
-    /// Algebraic states `ζ(x, u, p)` that are consistent with a state, and derivatives: of first
-    /// order, and of second order of `νᵀζ` if `nu` is not empty.
+    /// Computes algebraic states `ζ(x, u, p)` that are consistent with a state, and derivatives: of
+    /// first order, and of second order of `νᵀζ` if `nu` is not empty.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -57,29 +56,29 @@ pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'st
         Err(Error::NoInterpolation)
     }
 
-    /// Whether there are stages to be recorded: those of a method that solves equations for them.
+    /// Whether stages can be recorded: those of implicit methods.
     const RECORDS: bool = false;
-    /// Copies the stages of the last call, if there are any to be recorded.
+    /// Copies the stages of the last call, if they can be recorded.
     ///
     /// # Errors
     /// [`Error::NoResult`]
-    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+    fn record_stages(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         let _ = tape;
         Ok(false)
     }
-    /// Forgets the stages that the next call was to have, after an error.
-    fn forget(&mut self) {}
-    /// The next call has these stages, and only differentiates them.
+    /// Discards restored stages after an error.
+    fn discard_stages(&mut self) {}
+    /// Restores stages: the next call only differentiates them.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+    fn restore_stages(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         let _ = tape;
         Ok(())
     }
 }
 
-/// Algebraic states `ζ(x, u, p)`, and derivatives over `(x, u, p)`.
+/// Algebraic states `ζ(x, u, p)`, and their derivatives with respect to `(x, u, p)`.
 #[derive(Clone, Debug, Default)]
 pub struct Consistent {
     /// `ζ`
@@ -90,7 +89,7 @@ pub struct Consistent {
     pub hessian: Vec<f64>,
 }
 
-/// Where an interval begins, its control and its length.
+/// The start of an interval, its control and its length.
 pub struct IntervalStart<M: Dae> {
     /// The state at the start.
     pub x0: VectorX<M, f64>,
@@ -112,19 +111,19 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     }
 
     const RECORDS: bool = true;
-    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+    fn record_stages(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         tape.resize(self.options().steps, Zeroable::zeroed());
         self.copy_stages(tape).map(|()| true)
     }
-    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+    fn restore_stages(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         self.set_solution(tape)
     }
-    fn forget(&mut self) {
+    fn discard_stages(&mut self) {
         self.reset();
     }
 
     const FINDS_ALGEBRAIC_STATES: bool = true;
-    /// All stages of an interval of no length are at its start.
+    /// All stages of an interval of length zero are at its start.
     fn consistent(&mut self, at: &IntervalStart<M>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
         let copy = |to: &mut Consistent, result: &Forward<M>| {
             to.z.clear();
@@ -159,7 +158,7 @@ impl<M: Ode, B: Method<S> + 'static, const S: usize> Interval for erk::Integrato
     }
 }
 
-// `Engine` is sealed, and its integrators can be sent only where their states can.
+// `Engine` is sealed, and its integrators are `Send` only if their states are.
 impl<M: Dae, B: adaptive::Engine<M, f64> + 'static> Interval for adaptive::Integrator<M, B, f64>
 where
     Self: Send,
@@ -174,7 +173,7 @@ where
     fn depth(_: &AdaptiveOptions) -> Option<usize> {
         None
     }
-    fn choose(&mut self, at: &IntervalStart<M>) -> Result<(), Error> {
+    fn choose_steps(&mut self, at: &IntervalStart<M>) -> Result<(), Error> {
         self.solve(&at.x0, &at.u, at.h)?;
         self.freeze()
     }

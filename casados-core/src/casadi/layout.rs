@@ -1,8 +1,9 @@
-//! Where the numbers of a problem are in its variables, constraints and matrices.
+//! The layout of the variables, constraints and matrices of a problem.
 //!
-//! Variables of several stages that are one (shared controls, periodic states) are one variable of
-//! the program, at the place of the first. Behind those of all stages come slack variables `e`, one
-//! for each soft side; behind the constraints of all stages the soft bounds of variables:
+//! Identified variables of several stages (shared controls, periodic states) are one variable of
+//! the program, at the place of the first. The variables of all stages are followed by slack
+//! variables `e`, one for each soft side; the constraints of all stages by the soft bounds of
+//! variables:
 //!
 //! ```text
 //! lower ≤ x + e_lower − e_upper ≤ upper        e ≥ 0, at the cost linear · e + ½ quadratic · e²
@@ -15,15 +16,15 @@ use crate::qp::{QpView, StageDims};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Where the numbers of a problem are in its variables, constraints and matrices.
+/// The layout of the variables, constraints and matrices of a problem.
 #[derive(Default)]
 pub struct Layout {
     pub dims: Vec<StageDims>,
     pub variables: usize,
     pub constraints: usize,
-    /// The variable that each state and control is, stage after stage.
+    /// The index of the variable for each state and control, stage by stage.
     pub columns: Vec<usize>,
-    /// Constraints that are functions: all but soft bounds of variables.
+    /// The number of constraint functions: all constraints but soft bounds of variables.
     pub functions: usize,
     slacks: Vec<Slack>,
     /// The variables with soft bounds.
@@ -31,14 +32,14 @@ pub struct Layout {
     pub jacobian: MatrixSum,
     /// The upper triangle of the Hessian.
     pub upper: MatrixSum,
-    /// All of it, and where its entries are among those of the upper triangle.
+    /// The full Hessian, and the indices of its entries in the upper triangle.
     pub hessian: Sparsity,
     pub mirrored: Vec<usize>,
-    /// Bounds of variables, and of constraints.
+    /// The bounds of variables, and of constraints.
     pub bounds: [Vec<[f64; 2]>; 2],
 }
 
-/// A slack variable, which gives way to one side of a constraint.
+/// A slack variable that relaxes one side of a constraint.
 struct Slack {
     variable: usize,
     row: usize,
@@ -47,11 +48,11 @@ struct Slack {
     quadratic: f64,
 }
 
-/// What a layout is made of while it grows.
+/// A layout under construction.
 struct LayoutBuilder {
     layout: Layout,
     jacobian: Vec<Term>,
-    /// Of the upper triangle.
+    /// The terms of the upper triangle.
     hessian: Vec<Term>,
 }
 
@@ -79,20 +80,20 @@ impl Layout {
         layout
     }
 
-    /// States and controls of all stages.
+    /// Copies the variables to the states and controls of all stages.
     pub fn gather(&self, x: &[f64], to: &mut Vec<f64>) {
         to.clear();
         to.extend(self.columns.iter().map(|&column| x[column]));
     }
 
-    /// The variables at states and controls of all stages, without slack.
+    /// Copies the states and controls of all stages to the variables, except slack variables.
     pub fn scatter(&self, from: &[f64], to: &mut [f64]) {
         for (&column, &value) in self.columns.iter().zip(from).rev() {
             to[column] = value;
         }
     }
 
-    /// What slack variables cost.
+    /// The penalty of the slack variables.
     pub fn penalty(&self, x: &[f64]) -> f64 {
         self.slacks.iter().fold(0.0, |sum, slack| {
             let e = x[slack.variable];
@@ -100,7 +101,8 @@ impl Layout {
         })
     }
 
-    /// `g` of the ends of intervals and the values of constraints, at states and controls `v`.
+    /// Computes `g` from the ends of intervals and the values of constraints, at states and
+    /// controls `v`.
     pub fn constraints(&self, x: &[f64], v: &[f64], ends: &[f64], to: &mut [f64]) {
         let last = self.dims.len().saturating_sub(1);
         let phi: usize = self.dims.iter().skip(1).map(|dims| dims.nx).sum();
@@ -126,7 +128,7 @@ impl Layout {
         }
     }
 
-    /// `∇f`: those of all stages, and of the penalties.
+    /// Computes `∇f`: the gradients of all stages, and of the penalties.
     pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], to: &mut [f64]) {
         to.fill(0.0);
         let mut columns = self.columns.iter();
@@ -143,7 +145,7 @@ impl Layout {
 }
 
 impl LayoutBuilder {
-    /// The entries of the matrices of all stages.
+    /// Adds the entries of the matrices of all stages.
     fn stages(&mut self, program: &mut dyn Program) {
         let Layout { dims, columns, .. } = &self.layout;
         let (mut begin, mut row) = (0, 0);
@@ -185,7 +187,7 @@ impl LayoutBuilder {
         }
     }
 
-    /// Bounds, and slack variables where they are soft.
+    /// Adds bounds, with slack variables for soft sides.
     fn add_bounds(&mut self, program: &dyn Program) {
         let (mut begin, mut row) = (0, 0);
         for stage in 0..self.layout.dims.len() {
@@ -202,7 +204,8 @@ impl LayoutBuilder {
         }
     }
 
-    /// Bounds of a variable: a row if a side is soft. Of stages that share it the narrowest hold.
+    /// Adds the bounds of a variable, as a row if a side is soft. For a variable of several stages
+    /// the tightest bounds hold.
     fn add_variable_bounds(&mut self, variable: usize, limits: [SoftBound; 2]) {
         let none = [f64::NEG_INFINITY, f64::INFINITY];
         let (mut hard, mut soft) = (none, none);
@@ -221,7 +224,7 @@ impl LayoutBuilder {
         }
     }
 
-    /// A slack variable for each soft side of a row.
+    /// Adds a slack variable for each soft side of a row.
     fn slack(&mut self, row: usize, limits: [SoftBound; 2]) {
         for (limit, sign) in limits.into_iter().zip([1.0, -1.0]) {
             let Some([linear, quadratic]) = limit.penalty else { continue };
@@ -237,8 +240,8 @@ impl LayoutBuilder {
     }
 }
 
-/// The variable that each state and control is, and how many there are: shared controls are those
-/// of stage 0, periodic states of the last stage those of the first.
+/// The index of the variable for each state and control, and the number of variables: shared
+/// controls are those of stage 0, periodic states of the last stage are those of the first.
 fn columns(dims: &[StageDims], [periodic, shared]: &[Vec<usize>; 2]) -> (Vec<usize>, usize) {
     let last = dims.len().saturating_sub(1);
     let first = dims.first().map_or(0, |dims| dims.nx);

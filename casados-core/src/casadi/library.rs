@@ -1,5 +1,5 @@
-//! What lives as long as a shared library is loaded: the client of its functions, and a pool of
-//! memories, one for each thread that calls at the same time.
+//! The state of a loaded shared library: the client of its functions, and a pool of memories, one
+//! for each concurrent thread.
 
 use super::function::{Call, Signature};
 use crate::error::Error;
@@ -14,30 +14,30 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Several functions that share memory.
 pub trait FunctionLibrary: Send + Sync + 'static {
-    /// What a thread has to itself.
+    /// The memory of a thread.
     type Worker: Send;
-    /// Inputs and outputs of all functions.
+    /// The signatures of all functions.
     fn signatures(&self) -> &[Signature];
-    /// Memory for one thread.
+    /// Creates the memory of a thread.
     ///
     /// # Errors
     /// Those of the options.
     fn worker(&self) -> Result<Self::Worker, CallFailure>;
-    /// Computes the outputs of a function that are wanted.
+    /// Computes the requested outputs of a function.
     ///
     /// # Errors
-    /// Then the outputs mean nothing.
+    /// The outputs are then undefined.
     fn evaluate(
         &self,
         worker: &mut Self::Worker,
         function: usize,
         call: &mut dyn Call,
     ) -> Result<(), CallFailure>;
-    /// How many intervals were integrated.
+    /// The number of integrated intervals.
     fn integrations(&self) -> u64;
 }
 
-/// Why a call failed, in words.
+/// The cause of a failed call, as a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CallFailure(pub String);
 
@@ -48,13 +48,13 @@ impl From<Error> for CallFailure {
 }
 
 impl CallFailure {
-    /// A memory that is nobody's.
+    /// The failure for a memory that is not checked out.
     fn memory(id: i32) -> Self {
         Self(alloc::format!("memory {id} was not checked out, or another call has it"))
     }
 }
 
-/// A client that is made when it is needed first, and forgotten when nobody refers to it any more.
+/// A client that is created on first use, and dropped with its last reference.
 #[doc(hidden)]
 pub struct Library<C: FunctionLibrary> {
     make: fn() -> Result<C, CallFailure>,
@@ -69,7 +69,7 @@ struct State<C: FunctionLibrary> {
 
 /// A memory of the pool.
 enum WorkerSlot<W> {
-    /// Nobody's.
+    /// Not checked out.
     Free(Option<Box<W>>),
     /// Checked out.
     Ready(Option<Box<W>>),
@@ -78,17 +78,18 @@ enum WorkerSlot<W> {
 }
 
 impl<C: FunctionLibrary> Library<C> {
-    /// A library whose client is made by `make`.
+    /// A library whose client is created by `make`.
     pub const fn new(make: fn() -> Result<C, CallFailure>) -> Self {
         Self { make, state: Mutex::new(State { references: 0, client: None, memories: Vec::new() }) }
     }
 
-    /// The state; what a panic interrupts leaves it whole, since nothing in here panics half-way.
+    /// Locks the state, which is consistent even after a panic, since the code under the lock does
+    /// not panic.
     fn state(&self) -> MutexGuard<'_, State<C>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The client; none if it can't be made.
+    /// The client; none if it cannot be created.
     pub fn client(&self) -> Option<Arc<C>> {
         if let Some(client) = &self.state().client {
             return Some(Arc::clone(client));
@@ -98,13 +99,13 @@ impl<C: FunctionLibrary> Library<C> {
         Some(Arc::clone(self.state().client.get_or_insert(made)))
     }
 
-    /// Somebody more refers to the functions.
-    pub fn refer(&self) {
+    /// Adds a reference to the functions.
+    pub fn add_reference(&self) {
         self.state().references += 1;
     }
 
-    /// Somebody less does; with the last one everything is forgotten.
-    pub fn forget(&self) {
+    /// Removes a reference; the last one drops everything.
+    pub fn remove_reference(&self) {
         let mut state = self.state();
         state.references = state.references.saturating_sub(1);
         if state.references == 0 {
@@ -114,7 +115,7 @@ impl<C: FunctionLibrary> Library<C> {
         }
     }
 
-    /// A memory of the caller's own.
+    /// Checks a memory out for a caller.
     pub fn check_out(&self) -> Option<i32> {
         let mut state = self.state();
         let free = state.memories.iter().position(|memory| matches!(memory, WorkerSlot::Free(_)));
@@ -133,7 +134,7 @@ impl<C: FunctionLibrary> Library<C> {
         Some(number)
     }
 
-    /// A memory is nobody's again. One that is in a call stays there.
+    /// Returns a memory to the pool; one in a call returns at its end.
     pub fn release(&self, id: i32) {
         let mut state = self.state();
         let memory = usize::try_from(id).ok().and_then(|id| state.memories.get_mut(id));
@@ -144,10 +145,10 @@ impl<C: FunctionLibrary> Library<C> {
         }
     }
 
-    /// A call begins: it has the memory, until it ends.
+    /// Begins a call, which holds the memory until its end.
     ///
     /// # Errors
-    /// A memory that was not checked out; no client.
+    /// A memory that is not checked out; no client.
     pub fn begin(&self, id: i32) -> Result<PendingCall<C>, CallFailure> {
         let mut state = self.state();
         let client = match &state.client {
@@ -165,7 +166,7 @@ impl<C: FunctionLibrary> Library<C> {
         Ok(PendingCall { client, worker, id })
     }
 
-    /// Computes the outputs of a function that are wanted, which ends the call.
+    /// Computes the requested outputs of a function, and ends the call.
     ///
     /// # Errors
     /// Those of the client; no such function; a panic.
@@ -175,7 +176,7 @@ impl<C: FunctionLibrary> Library<C> {
         function: usize,
         call: &mut dyn Call,
     ) -> Result<(), CallFailure> {
-        // After a panic the worker is gone, and the next call has a new one.
+        // A panic drops the worker, and the next call creates a new one.
         let outcome = catch_panic(AssertUnwindSafe(|| {
             let mut worker = match worker {
                 Some(worker) => worker,
@@ -196,7 +197,7 @@ impl<C: FunctionLibrary> Library<C> {
     }
 }
 
-/// A call that has begun.
+/// A call in progress.
 pub struct PendingCall<C: FunctionLibrary> {
     client: Arc<C>,
     worker: Option<Box<C::Worker>>,
@@ -204,7 +205,7 @@ pub struct PendingCall<C: FunctionLibrary> {
 }
 
 impl<C: FunctionLibrary> PendingCall<C> {
-    /// Whose function is called.
+    /// The client of the call.
     pub fn client(&self) -> Arc<C> {
         Arc::clone(&self.client)
     }
@@ -229,7 +230,7 @@ impl<C: FunctionLibrary> State<C> {
     }
 }
 
-/// What a function returns, or that it panicked.
+/// Runs a function; converts a panic to a failure.
 fn catch_panic<R>(run: impl FnOnce() -> R) -> Result<R, CallFailure> {
     catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
         let said = panic.downcast_ref::<&str>().copied().map(String::from);
@@ -238,7 +239,7 @@ fn catch_panic<R>(run: impl FnOnce() -> R) -> Result<R, CallFailure> {
     })
 }
 
-/// Writes a failure to where errors go, if the environment asks for that: solvers try points at
+/// Writes a failure to standard error, if the environment requests it: solvers also try points at
 /// which functions fail.
 fn log_failure(what: &dyn Display) {
     if std::env::var_os("CASADOS_CASADI_ERRORS").is_some() {

@@ -1,8 +1,8 @@
 //! Integrators as external functions of CasADi, in a shared library (feature `casadi`).
 //!
 //! CasADi finds functions of a shared library by their names:
-//! `casadi.external("pendulum", "./libmodel.so")` is an ordinary `casadi.Function` then, with exact
-//! first and second derivatives. [`export!`] writes them. In a crate of the type `cdylib`:
+//! `casadi.external("pendulum", "./libmodel.so")` is an ordinary `casadi.Function` with exact first
+//! and second derivatives. [`export!`] defines them, in a crate of the type `cdylib`:
 //!
 //! ```text
 //! casados::casadi::export! {
@@ -15,22 +15,22 @@
 //! | `F` | `x0`, `u`, `p` | `xf`; `zf` with `algebraic = true`; `qf` with `quadrature = F` |
 //! | `jac_F` | and `out_xf` | `∂xf/∂x0`, `∂xf/∂u`, … |
 //! | `adj1_F` | and `adj_xf`, which is `λ` | `∇(λᵀxf)` |
-//! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and the transposed Jacobian, which is the derivative by `λ` |
+//! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and its derivative with respect to `λ`, the transposed Jacobian |
 //!
-//! Patterns are those of the model's graph, followed over stages and steps. What was computed at
-//! the last inputs is remembered ([`Settings::cache`]): the stages are solved for once, whatever is
-//! asked about them, in whatever order. Results that nobody wants are not computed. A call that
-//! fails returns CasADi's status for that; with the variable `CASADOS_CASADI_ERRORS` in the
-//! environment it says why on standard error. Threads (`F.map(N, "thread")`)
-//! have memory of their own.
+//! Sparsity patterns are those of the model's graph, propagated over stages and steps. Results for
+//! the last inputs are cached ([`Settings::cache`]): the stages are solved once, for requests in
+//! any order. Only requested outputs are computed. A failed call returns CasADi's status; with the
+//! environment variable `CASADOS_CASADI_ERRORS` it writes the cause to standard error. Threads
+//! (`F.map(N, "thread")`) have memory of their own.
 //!
-//! `zf` are the algebraic states that are consistent with `xf`, of implicit methods.
+//! `zf` are the algebraic states consistent with `xf`, for implicit methods.
 //!
-//! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
-//! smooth function of its inputs.
+//! An adaptive integrator takes the steps chosen at [`Settings::steps_at`] in all calls: a smooth
+//! function of its inputs.
 //!
-//! [`export_horizon!`] has the same functions for all intervals of a horizon in one call, a column
-//! for each; [`export_problem!`] a whole problem of [`ocp`](crate::ocp) for `casadi.nlpsol`.
+//! [`export_horizon!`] exports the same functions for all intervals of a horizon in one call, one
+//! column for each; [`export_problem!`] exports a problem of [`ocp`](crate::ocp) for
+//! `casadi.nlpsol`.
 //!
 //! The interface is described in CasADi's `casadi/core/external.cpp` and `external_impl.hpp`.
 
@@ -66,7 +66,7 @@ pub use crate::{
     __casadi_export_problem as export_problem,
 };
 pub use program::Program;
-// What the macros write.
+// Items used by the macros.
 #[doc(hidden)]
 pub use self::{
     horizon::{Horizon, Horizons},

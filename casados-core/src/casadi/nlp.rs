@@ -1,4 +1,4 @@
-//! Names and patterns of the functions of a problem, as `casadi.nlpsol` asks for them.
+//! Names and sparsity patterns of the functions of a problem, for `casadi.nlpsol`.
 
 use super::function::{Port, Signature};
 use super::groups::Group;
@@ -7,7 +7,7 @@ use super::sparsity::Sparsity;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Inputs and outputs of all functions.
+/// The signatures of all functions.
 pub fn signatures(layout: &Layout, groups: &[Group], transposed: Sparsity) -> Vec<Signature> {
     let [jacobian, upper] = [&layout.jacobian.sparsity, &layout.upper.sparsity];
     let (n, m) = (layout.variables, layout.constraints);

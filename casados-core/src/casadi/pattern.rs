@@ -1,5 +1,5 @@
-//! Where the matrices of a stage of a problem may differ from zero: what the graphs of model, costs
-//! and constraints know, followed through the interval.
+//! Sparsity patterns of the matrices of a stage: those of the model, costs and constraints,
+//! propagated through the interval.
 
 use super::dependence::{self, Dimensions};
 use super::sparsity::Dependence;
@@ -7,28 +7,28 @@ use crate::ocp::{Constraints, Cost, DerivativeEntry, Dynamics, DynamicsStructure
 use crate::shape::Shape;
 use crate::structure::Pattern;
 
-/// Where the matrices of a stage may differ from zero, over its states and controls.
+/// The sparsity patterns of a stage, with respect to its states and controls.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StagePattern {
-    /// Of the end of the interval, then of the constraints.
+    /// The Jacobian of the end of the interval, followed by that of the constraints.
     pub jacobian: Dependence,
-    /// Of what the interval adds to the Hessian of the Lagrangian.
+    /// The contribution of the interval to the Hessian of the Lagrangian.
     pub interval: Dependence,
-    /// Of what costs and constraints at the node do.
+    /// The contribution of costs and constraints at the node.
     pub node: Dependence,
 }
 
 /// What a stage has.
 struct Stage {
     pattern: StagePattern,
-    /// On which states and controls each of `(x, u, z)` depends.
+    /// The states and controls on which each of `(x, u, z)` depends.
     variables: Dependence,
-    /// Rows of the end of the interval.
+    /// The number of rows of the end of the interval.
     next: usize,
 }
 
 impl Stage {
-    /// What a function at the node says about itself; everything if it says nothing.
+    /// Adds the pattern of a function at the node; a dense one if it has none.
     fn add(&mut self, first: usize, tell: impl FnOnce(&mut dyn FnMut(DerivativeEntry)) -> bool) {
         let Self { pattern: StagePattern { jacobian, node, .. }, variables, .. } = self;
         let is_known = tell(&mut |entry| match entry {
@@ -43,7 +43,7 @@ impl Stage {
         }
     }
 
-    /// The end of the interval.
+    /// Adds the end of the interval.
     fn add_interval_end(&mut self, origin: DynamicsStructure, dimensions: Dimensions, controls: usize) {
         let Dimensions { nx, nz, .. } = dimensions;
         match origin {
@@ -68,7 +68,7 @@ impl Stage {
         }
     }
 
-    /// The end of the interval as a function of the variables `(ẋ, x, z, u, …)` of a model.
+    /// Adds the end of the interval as a function of the variables `(ẋ, x, z, u, …)` of a model.
     fn map(&mut self, jacobian: Pattern, hessian: Pattern, Dimensions { nx, nz, .. }: Dimensions, nu: usize) {
         let position = |variable: usize| match variable.checked_sub(nx)? {
             state if state < nx => Some(state),
@@ -87,7 +87,7 @@ impl Stage {
     }
 }
 
-/// The patterns of a stage: of all but the last, or of the last, with `rows` constraints.
+/// The patterns of a stage, the last one or another, with `rows` constraints.
 pub fn stage_pattern<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize) -> StagePattern {
     let [nx, nz, nu] = [P::Shape::NX, P::Shape::NZ, P::Shape::NU];
     let [next, nu, nz] = if is_last { [0; 3] } else { [nx, nu, nz] };

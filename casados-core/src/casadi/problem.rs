@@ -1,8 +1,7 @@
-//! A whole problem of optimal control as the functions that `casadi.nlpsol` asks a library for.
+//! An optimal control problem as the functions of a library for `casadi.nlpsol`.
 //!
-//! IPOPT takes the upper triangle of the Hessian of `γ = σ f + μᵀg`. Other solvers ask for other
-//! functions: they get those that CasADi makes of `nlp` and its derivatives, which have the form of
-//! those of any external function.
+//! IPOPT uses the upper triangle of the Hessian of `γ = σ f + μᵀg`. Other solvers use other
+//! functions, which CasADi derives from `nlp` and its derivatives, as for any external function.
 
 use super::function::{Call, Port, Signature};
 use super::groups::{Group, groups};
@@ -19,10 +18,10 @@ use alloc::vec::Vec;
 use core::ops::Range;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-/// What makes a problem.
+/// Creates a problem.
 pub type ProgramConstructor = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 
-/// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
+/// The functions of a problem, in the order of their indices: `nlp`, `nlp_f`, `nlp_g`,
 /// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
 /// `jac_adj1_nlp`, `nlp_trajectory`.
 #[doc(hidden)]
@@ -30,53 +29,53 @@ pub struct Problems {
     make: ProgramConstructor,
     layout: Layout,
     signatures: Vec<Signature>,
-    /// States and controls by their names.
+    /// The groups of states and controls.
     groups: Vec<Group>,
-    /// Where the entries of the transposed Jacobian are among those of the Jacobian.
+    /// The indices of the entries of the transposed Jacobian in the Jacobian.
     transposed: Vec<usize>,
-    /// What was wrong with the problem when it was made first.
+    /// The error of the first construction of the problem, if any.
     wrong: Option<String>,
     integrations: AtomicU64,
 }
 
-/// A problem, and what is known at the last point.
+/// A problem, with the results at the last point.
 pub struct Worker {
     program: Box<dyn Program>,
     x: Vec<f64>,
-    /// States and controls of all stages there.
+    /// The states and controls of all stages at the last point.
     v: Vec<f64>,
     input: Vec<f64>,
-    /// `σ`, then `μ`.
+    /// `σ`, followed by `μ`.
     multipliers: Vec<f64>,
     input_multipliers: Vec<f64>,
     known: PointCache,
-    /// Whether derivatives were asked for at the last point that values were asked for at.
-    follows: bool,
+    /// Whether derivatives were requested at the last point with requested values.
+    derivatives_requested: bool,
     objective: f64,
     ends: Vec<f64>,
     gradient: Vec<f64>,
     jacobian: Vec<f64>,
     /// The upper triangle of the Hessian.
     hessian: Vec<f64>,
-    /// Room for a point, and for multipliers over `σ`.
-    room: Trial,
+    /// Memory for a point, and for multipliers divided by `σ`.
+    trial_point: Trial,
     scaled: Vec<f64>,
 }
 
-/// What is known at the last point.
+/// The results that are valid at the last point.
 #[derive(Clone, Copy, Default)]
 struct PointCache {
     value: bool,
-    /// Gradient and Jacobian.
+    /// Whether gradient and Jacobian are valid.
     first: bool,
-    /// The Hessian, with the last multipliers.
+    /// Whether the Hessian is valid, for the last multipliers.
     second: bool,
 }
 
 const CONSTRUCTION_FAILED: &str = "the problem could not be made";
 
 impl Problems {
-    /// The functions of what `make` makes.
+    /// The functions of the problem that `make` creates.
     #[must_use]
     pub fn new(make: ProgramConstructor) -> Self {
         let made = make().map_err(|error| error.to_string());
@@ -93,36 +92,37 @@ impl Problems {
         Self { make, layout, signatures, groups, transposed, wrong, integrations: AtomicU64::new(0) }
     }
 
-    /// What comes before intervals are integrated, or differentiated where they were.
+    /// Prepares the integration of intervals, or the differentiation of known stages.
     fn prepare_intervals(&self, program: &mut dyn Program, known: bool) {
         let known = program.keep_stages(known);
         let intervals = if known { 0 } else { self.layout.dims.len().saturating_sub(1) as u64 };
         self.integrations.fetch_add(intervals, Ordering::Relaxed);
     }
 
-    /// What is asked at a point: values alone, or with the derivatives that are asked for next.
+    /// Evaluates the problem at a point: values, with derivatives if these were requested after the
+    /// last values.
     fn value(&self, worker: &mut Worker) -> Result<(), OcpError> {
         if worker.known.value {
             return Ok(());
         }
-        if worker.follows {
+        if worker.derivatives_requested {
             self.first(worker)?;
-            // Until somebody wants them.
-            worker.follows = false;
+            // Reset until derivatives are requested.
+            worker.derivatives_requested = false;
             return Ok(());
         }
         self.prepare_intervals(worker.program.as_mut(), false);
-        worker.objective = worker.program.value(&worker.v, &mut worker.room, &mut worker.ends)?;
+        worker.objective = worker.program.value(&worker.v, &mut worker.trial_point, &mut worker.ends)?;
         worker.known.value = true;
         Ok(())
     }
 
     fn first(&self, worker: &mut Worker) -> Result<(), OcpError> {
-        worker.follows = true;
+        worker.derivatives_requested = true;
         if worker.known.first {
             return Ok(());
         }
-        // What an error interrupts is known no more.
+        // After an error no results are valid.
         let known = core::mem::take(&mut worker.known);
         self.prepare_intervals(worker.program.as_mut(), known.value);
         let Layout { jacobian: slopes, upper, .. } = &self.layout;
@@ -139,8 +139,8 @@ impl Problems {
         Ok(())
     }
 
-    /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
-    /// It is kept unless it has a place of its own.
+    /// The Hessian `σ H(μ/σ)`; for `σ = 0` the part linear in `μ`: `H(μ) − H(0)`, both with
+    /// `σ = 1`. It is stored unless written to `to`.
     fn evaluate_hessian(&self, worker: &mut Worker, to: Option<&mut [f64]>) -> Result<(), OcpError> {
         if worker.known.second && to.is_none() {
             return Ok(());
@@ -166,7 +166,7 @@ impl Problems {
         Ok(())
     }
 
-    /// The Hessian times `factor`; and gradient and Jacobian, if they are not `known`.
+    /// Assembles the Hessian times `factor`; also gradient and Jacobian, unless they are `known`.
     fn assemble_hessian(
         &self,
         worker: &mut Worker,
@@ -221,13 +221,13 @@ impl FunctionLibrary for Problems {
             multipliers: vec![f64::NAN; m + 1],
             input_multipliers: vec![0.0; m + 1],
             known: PointCache::default(),
-            follows: false,
+            derivatives_requested: false,
             objective: 0.0,
             ends: Vec::new(),
             gradient: vec![0.0; n],
             jacobian: vec![0.0; self.transposed.len()],
             hessian: vec![0.0; self.layout.upper.sparsity.entries().len()],
-            room: Solution::new(&self.layout.dims).map_err(|error| CallFailure(error.to_string()))?,
+            trial_point: Solution::new(&self.layout.dims).map_err(|error| CallFailure(error.to_string()))?,
             scaled: Vec::new(),
         })
     }
@@ -256,7 +256,7 @@ impl FunctionLibrary for Problems {
                 worker.multipliers.copy_from_slice(&worker.input_multipliers);
             }
         }
-        // Derivatives first, with which values come.
+        // Derivatives first, which include values.
         let is_value = |port: &Port| [c"f", c"g"].contains(&port.name.as_ref());
         for values in [false, true] {
             for (output, port) in signature.outputs.iter().enumerate() {
@@ -276,7 +276,7 @@ impl FunctionLibrary for Problems {
 }
 
 impl Problems {
-    /// Computes and writes an output; the Hessian that IPOPT asks for to where it belongs.
+    /// Computes and writes an output; writes IPOPT's Hessian in place.
     fn compute_output(&self, worker: &mut Worker, port: &Port, to: &mut [f64]) -> Result<(), OcpError> {
         match port.name.to_bytes() {
             b"f" | b"g" => self.value(worker)?,
@@ -292,7 +292,7 @@ impl Problems {
         Ok(())
     }
 
-    /// An output; those of other names have no entries.
+    /// Writes an output; ports with other names have no entries.
     fn write(&self, worker: &Worker, port: &Port, to: &mut [f64]) {
         let Some((&sigma, mu)) = worker.multipliers.split_first() else { return };
         match port.name.to_bytes() {
@@ -323,7 +323,7 @@ impl Problems {
         }
     }
 
-    /// States or controls of all stages, one behind the other.
+    /// Writes the states or controls of all stages, one after the other.
     fn write_trajectory(&self, worker: &Worker, choose: impl Fn(&StageDims) -> Range<usize>, to: &mut [f64]) {
         let (mut rest, mut to) = (&worker.v[..], to.iter_mut());
         for dims in &self.layout.dims {
@@ -335,7 +335,7 @@ impl Problems {
         }
     }
 
-    /// Bounds, the iterate as a start, and bounds of the constraints.
+    /// Writes bounds, the iterate as the initial guess, and bounds of the constraints.
     fn write_bounds(&self, worker: &Worker, call: &mut dyn Call) {
         let mut start = vec![0.0; self.layout.variables];
         self.layout.scatter(&worker.program.point(), &mut start);
@@ -351,7 +351,7 @@ impl Problems {
     }
 }
 
-/// Some of the numbers.
+/// Copies selected elements.
 fn copy_selected(from: &[f64], places: &[usize], to: &mut [f64]) {
     for (to, &place) in to.iter_mut().zip(places) {
         *to = from[place];

@@ -1,4 +1,4 @@
-//! A problem of optimal control as a nonlinear program: what is asked of it.
+//! The interface of an optimal control problem as a nonlinear program.
 
 use super::entries::Blocks;
 use super::pattern::{StagePattern, stage_pattern};
@@ -9,49 +9,50 @@ use crate::qp::{Bounds, QpView, Solution, StageDims, marked_indices};
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// A problem of optimal control, whose variables and constraints are
+/// An optimal control problem with the variables and constraints
 ///
 /// ```text
 /// x = (x₀, u₀, x₁, u₁, …, x_N, e)        g = (φ(x₀, u₀) − x₁, g₀, φ(x₁, u₁) − x₂, g₁, …, g_N, soft bounds)
 /// ```
 ///
-/// where shared controls are in `u₀` alone and periodic states in `x₀` alone, and soft sides have
-/// slack variables `e`.
+/// Shared controls are part of `u₀` only, periodic states of `x₀` only, and soft sides have slack
+/// variables `e`.
 pub trait Program: Send {
-    /// Dimensions of the stages.
+    /// The dimensions of the stages.
     fn dims(&self) -> Vec<StageDims>;
-    /// What states and controls are called.
+    /// The names of states and controls.
     fn names(&self) -> [&'static [&'static str]; 2];
-    /// Which states are periodic, and which controls are shared.
+    /// The indices of periodic states, and of shared controls.
     fn couplings(&self) -> [Vec<usize>; 2];
-    /// Where the matrices of a stage may differ from zero.
+    /// The sparsity patterns of the matrices of a stage.
     fn pattern(&mut self, stage: usize) -> StagePattern;
-    /// Bounds of the states and controls of a stage.
+    /// The bounds of the states and controls of a stage.
     fn bounds(&self, stage: usize) -> Vec<[SoftBound; 2]>;
-    /// Bounds of its constraints.
+    /// The bounds of the constraints of a stage.
     fn limits(&self, stage: usize) -> Vec<[SoftBound; 2]>;
-    /// Whether all that was to be said was.
+    /// Checks that the problem is complete.
     ///
     /// # Errors
-    /// What is wrong, as a text.
+    /// A text that describes the problem.
     fn check(&mut self) -> Result<(), String>;
-    /// States and controls of the iterate, stage after stage.
+    /// The states and controls of the iterate, stage by stage.
     fn point(&self) -> Vec<f64>;
-    /// Keeps the stages of the following calls; those of the last one are theirs if `known`: it was
-    /// at the same point, and successful. Whether intervals are not integrated again.
+    /// Keeps the stages of later calls; with `known` those of the last call are reused, since it
+    /// succeeded at the same point. Returns whether intervals are not integrated again.
     fn keep_stages(&mut self, known: bool) -> bool;
-    /// The objective, and `φ` of every interval and `g` of every stage in `ends`; with room for a
-    /// point.
+    /// Computes the objective, and writes `φ` of every interval and `g` of every stage to `ends`;
+    /// `room` is memory for a point.
     ///
     /// # Errors
     /// Those of functions and integrators.
     fn value(&mut self, v: &[f64], room: &mut Trial, ends: &mut Vec<f64>) -> Result<f64, OcpError>;
-    /// The same with derivatives.
+    /// As [`Program::value`], with derivatives.
     ///
     /// # Errors
     /// Those of functions and integrators.
     fn first(&mut self, v: &[f64], ends: &mut Vec<f64>, to: Derivatives<'_>) -> Result<f64, OcpError>;
-    /// The same with the Hessian of the Lagrangian, where `multipliers` are those of `φ` and `g`.
+    /// As [`Program::first`], with the Hessian of the Lagrangian; `multipliers` are those of `φ`
+    /// and `g`.
     ///
     /// # Errors
     /// Those of functions and integrators.
@@ -62,33 +63,33 @@ pub trait Program: Send {
         ends: &mut Vec<f64>,
         to: Derivatives<'_>,
     ) -> Result<f64, OcpError>;
-    /// Derivatives of costs and constraints at the last point: matrices of these, Hessians, and the
+    /// Derivatives of costs and constraints at the last point: Jacobians, Hessians, and the
     /// gradient of the objective.
     fn qp(&self) -> QpView<'_, f64>;
 }
 
-/// Where derivatives go that are not in [`Program::qp`].
+/// Receives the derivatives that are not in [`Program::qp`].
 pub struct Derivatives<'a> {
-    /// Makes zero what the Hessian at a node had.
+    /// Sets the terms of the Hessian at a node to zero.
     pub clear: &'a dyn Fn(usize, &mut [f64]),
-    /// Takes those of every interval.
+    /// Receives the derivatives of every interval.
     pub interval: &'a mut dyn FnMut(usize, &Blocks<'_>),
 }
 
 /// A point of all stages.
 pub type Trial = Solution<f64, Vec<StageDims>, Vec<f64>>;
 
-/// A side of a bound.
+/// One side of a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoftBound {
-    /// Infinite if there is none.
+    /// The bound; infinite if there is none.
     pub value: f64,
-    /// What leaving it costs, linearly and quadratically; nothing if it is hard.
+    /// The linear and the quadratic penalty of a violation; none for a hard bound.
     pub penalty: Option<[f64; 2]>,
 }
 
 impl SoftBound {
-    /// A side with its penalties; an infinite one is hard.
+    /// A side with its penalties; infinite ones are hard.
     fn new(value: f64, linear: f64, quadratic: f64) -> Self {
         let is_soft = value.is_finite() && linear.is_finite();
         Self { value, penalty: is_soft.then_some([linear, quadratic]) }
@@ -202,7 +203,7 @@ where
     }
 }
 
-/// Derivatives at the iterate: the objective, and `φ` and `g` in `ends`.
+/// Computes derivatives at the iterate: the objective, and `φ` and `g` in `ends`.
 fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
     ocp: &mut HeapOcp<P, f64>,
     curvature: C,
@@ -220,7 +221,7 @@ fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
     ocp.evaluate_constraints(ends.get_mut(phi..).unwrap_or_default())
 }
 
-/// States, controls and multipliers to where the problem reads them.
+/// Copies states, controls and multipliers to the point of the problem.
 fn write(to: &mut Trial, mut v: &[f64], mut multipliers: &[f64]) {
     let take = |from: &mut &[f64], to: &mut [f64]| {
         let (here, behind) = from.split_at(to.len().min(from.len()));

@@ -1,17 +1,17 @@
-//! Second derivatives over `(x₀, u, p)` as integrators have them: the blocks `xx`, `xu`, `uu`,
-//! `xp`, `up` and `pp`, one behind the other, each column by column.
+//! Second derivatives with respect to `(x₀, u, p)` in the layout of integrators: the blocks `xx`,
+//! `xu`, `uu`, `xp`, `up` and `pp`, one after the other, each in column-major order.
 
-/// Where the blocks are, for so many states, controls and parameters.
+/// The layout of the blocks, for these numbers of states, controls and parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Blocks(pub [usize; 3]);
 
 impl Blocks {
-    /// How many numbers there are.
+    /// The number of elements.
     pub fn len(self) -> usize {
         self.offset(0, 3)
     }
 
-    /// Where the block of two kinds begins, the first of which comes first.
+    /// The offset of the block of two kinds, in order.
     fn offset(self, one: usize, two: usize) -> usize {
         let Self(sizes) = self;
         let columns = (0..two).flat_map(|column| (0..=column).map(move |row| (row, column)));
@@ -19,8 +19,8 @@ impl Blocks {
         before.map(|(row, column)| sizes[row] * sizes.get(column).copied().unwrap_or(0)).sum()
     }
 
-    /// Where the derivatives by two kinds of variables begin, and the distances of rows and of
-    /// columns.
+    /// The offset of the derivatives with respect to two kinds of variables, and the strides of
+    /// rows and of columns.
     pub fn block_layout(self, row: usize, column: usize) -> [usize; 3] {
         let Self(sizes) = self;
         if row <= column {
@@ -30,14 +30,14 @@ impl Blocks {
         }
     }
 
-    /// Where the derivative by two directions is.
+    /// The index of the derivative with respect to two directions.
     pub fn index(self, row: usize, column: usize) -> usize {
         let [(one, i), (two, j)] = [self.kind(row), self.kind(column)];
         let [first, of_rows, of_columns] = self.block_layout(one, two);
         first + of_rows * i + of_columns * j
     }
 
-    /// Which kind a direction is, and which of it.
+    /// The kind of a direction, and its index in that kind.
     fn kind(self, direction: usize) -> (usize, usize) {
         let Self([nx, nu, _]) = self;
         match direction {

@@ -1,8 +1,8 @@
-//! Names, patterns and sources of the outputs of `F`, `jac_F`, `adj1_F` and `jac_adj1_F`, of one
-//! interval or of many side by side, whose matrices are block-diagonal.
+//! Names, sparsity patterns and sources of the outputs of `F`, `jac_F`, `adj1_F` and `jac_adj1_F`,
+//! for one interval or for many, whose matrices are block-diagonal.
 //!
-//! Inputs of a derivative are those of the function, then its outputs, `out_…`, whose patterns are
-//! empty here: nothing depends on them, and CasADi does not compute what nobody needs. Blocks of
+//! Inputs of a derivative are those of the function, followed by its outputs, `out_…`, with empty
+//! patterns: nothing depends on them, and CasADi does not compute unused values. Blocks of
 //! Jacobians are ordered by output, then by input.
 
 use super::function::{Port, Signature};
@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 use core::ffi::CStr;
 use core::ops::Range;
 
-/// Where the numbers of an output are.
+/// The source of the numbers of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// `y`
@@ -23,15 +23,15 @@ pub enum Source {
     Gradient,
     /// `∇²(λᵀy)`
     Hessian,
-    /// There are none.
+    /// No numbers.
     Zero,
 }
 
-/// The place of a number in its source.
+/// The index of a number in its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry(pub usize);
 
-/// Places at equal distances, at least one.
+/// Indices at equal distances, at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StridedPlaces {
     pub first: usize,
@@ -39,16 +39,16 @@ pub struct StridedPlaces {
     pub count: usize,
 }
 
-/// Where the numbers of an output come from.
+/// The source of an output, and its entries.
 #[derive(Clone, Debug)]
 pub struct Output {
-    /// What they are part of.
+    /// The source.
     pub source: Source,
-    /// The place of each non-zero there.
+    /// The index of each non-zero in the source.
     pub entries: Vec<Entry>,
-    /// The same as places at equal distances, in their order.
+    /// The same indices as runs at equal distances, in order.
     pub runs: Vec<StridedPlaces>,
-    /// Whether these are of algebraic states.
+    /// Whether the output belongs to algebraic states.
     pub algebraic: bool,
 }
 
@@ -68,7 +68,7 @@ impl Output {
     }
 }
 
-/// Which of the outputs are algebraic states.
+/// The index of the output of algebraic states.
 const ALGEBRAIC: usize = 1;
 const INPUTS: [&CStr; 3] = [c"x0", c"u", c"p"];
 const OUTPUTS: [&CStr; 3] = [c"xf", c"zf", c"qf"];
@@ -102,38 +102,38 @@ pub fn is_seed(port: &Port) -> bool {
     SEEDS.contains(&port.name.as_ref())
 }
 
-/// What one interval has.
+/// The dimensions and patterns of one interval.
 pub struct Shape<'a> {
-    /// How many intervals there are.
+    /// The number of intervals.
     pub count: usize,
     /// The inputs as ranges of `w`.
     pub inputs: [Range<usize>; 3],
-    /// States, algebraic states and integrals as ranges of `y`; those that are empty are no
-    /// outputs, but for the states.
+    /// The states, algebraic states and integrals as ranges of `y`; empty ones are no outputs,
+    /// except the states.
     pub outputs: [Range<usize>; 3],
-    /// Where `∂y/∂w` has entries.
+    /// The pattern of `∂y/∂w`.
     pub value: &'a Dependence,
-    /// Where `∇²(λᵀy)` has.
+    /// The pattern of `∇²(λᵀy)`.
     pub hessian: &'a Dependence,
 }
 
 impl Shape<'_> {
-    /// Where the blocks of second derivatives are.
+    /// The layout of second derivatives.
     fn blocks(&self) -> Blocks {
         Blocks([0, 1, 2].map(|kind| self.inputs[kind].len()))
     }
 
-    /// Elements of `w`.
+    /// The number of elements of `w`.
     fn directions(&self) -> usize {
         self.inputs.iter().map(Range::len).sum()
     }
 
-    /// Elements of `y`.
+    /// The number of elements of `y`.
     fn rows(&self) -> usize {
         self.outputs.iter().map(Range::len).sum()
     }
 
-    /// What the outputs are, and their ranges.
+    /// The existing outputs, with their ranges.
     fn existing_outputs(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
         self.outputs.iter().cloned().enumerate().filter(|(kind, range)| *kind == 0 || !range.is_empty())
     }
@@ -166,7 +166,7 @@ impl Shape<'_> {
         ]
     }
 
-    /// A column for each interval.
+    /// Ports with one column for each interval.
     fn ports(&self, names: &[&'static CStr], ranges: &[Range<usize>], zero: bool) -> Vec<Port> {
         let sparsity = |length| Sparsity::new(length, self.count, |_, _| !zero);
         names.iter().zip(ranges).map(|(name, range)| Port::new(*name, sparsity(range.len()))).collect()
@@ -244,7 +244,7 @@ impl Shape<'_> {
         source: Source,
         place: BlockPlace,
     ) {
-        // How much there is of one interval.
+        // The number of elements of one interval.
         let length = match source {
             Source::Hessian => self.blocks().len(),
             _ => self.rows() * self.directions(),
@@ -259,8 +259,8 @@ impl Shape<'_> {
     }
 }
 
-/// Where the first element of a block is, the distances of rows and columns, and whether they are
-/// of algebraic states.
+/// The index of the first element of a block, the strides of rows and columns, and whether the
+/// block belongs to algebraic states.
 #[derive(Clone, Copy)]
 struct BlockPlace {
     first: usize,

@@ -1,12 +1,12 @@
-//! Patterns of matrices as CasADi reads them, and what they are for an integrator.
+//! Sparsity patterns of matrices in CasADi's format, and as dependences of an integrator.
 
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// Structural non-zeros of a matrix in compressed columns, as CasADi reads them: numbers of rows
-/// and columns, where each column begins and the last one ends, rows; or both numbers and a one if
-/// nothing is zero.
+/// Structural non-zeros of a matrix in CasADi's compressed column format: numbers of rows and
+/// columns, offsets of the columns and the number of non-zeros, rows; for a dense matrix both
+/// numbers and a one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sparsity {
     compressed: Vec<i64>,
@@ -15,13 +15,13 @@ pub struct Sparsity {
 }
 
 impl Sparsity {
-    /// The pattern of the entries for which this holds.
+    /// The pattern of the entries for which `is_entry` holds.
     pub fn new(rows: usize, columns: usize, is_entry: impl Fn(usize, usize) -> bool) -> Self {
         let all = (0..columns).flat_map(|column| (0..rows).map(move |row| (row, column)));
         Self::from_entries(rows, columns, all.filter(|&(row, column)| is_entry(row, column)).collect())
     }
 
-    /// The pattern of these entries, which are in order: column by column.
+    /// The pattern of these entries, in column-major order.
     pub fn from_entries(rows: usize, columns: usize, entries: Vec<(usize, usize)>) -> Self {
         let mut compressed = vec![rows as i64, columns as i64];
         if entries.len() == rows * columns && !entries.is_empty() {
@@ -37,17 +37,17 @@ impl Sparsity {
         Self { compressed, entries }
     }
 
-    /// The pattern of a vector without zeros.
+    /// The pattern of a dense vector.
     pub fn vector(rows: usize) -> Self {
         Self::new(rows, 1, |_, _| true)
     }
 
-    /// The pattern of a matrix that is zero.
+    /// The pattern of a zero matrix.
     pub fn zero(rows: usize, columns: usize) -> Self {
         Self::new(rows, columns, |_, _| false)
     }
 
-    /// The pattern of the transposed matrix, and where its entries are among those of this one.
+    /// The pattern of the transposed matrix, and the indices of its entries in this pattern.
     pub fn transposed(&self) -> (Self, Vec<usize>) {
         let [rows, columns] = self.dimensions();
         let mut order: Vec<usize> = (0..self.entries.len()).collect();
@@ -56,8 +56,8 @@ impl Sparsity {
         (Self::from_entries(columns, rows, swap_rows_and_columns(entries)), order)
     }
 
-    /// The pattern of the symmetric matrix with this upper triangle, and where its entries are
-    /// among those of this one.
+    /// The pattern of the symmetric matrix with this upper triangle, and the indices of its entries
+    /// in this pattern.
     pub fn symmetric(&self) -> (Self, Vec<usize>) {
         let [rows, columns] = self.dimensions();
         let entries = self.entries.iter().enumerate();
@@ -70,7 +70,7 @@ impl Sparsity {
         (Self::from_entries(rows, columns, swap_rows_and_columns(entries)), places)
     }
 
-    /// This pattern so many times along the diagonal.
+    /// A block-diagonal pattern with `count` copies of this one.
     pub fn diagonal(&self, count: usize) -> Self {
         let [rows, columns] = self.dimensions();
         let of = |k: usize| self.entries.iter().map(move |&(i, j)| (k * rows + i, k * columns + j));
@@ -82,7 +82,7 @@ impl Sparsity {
         [0, 1].map(|index| self.compressed.get(index).map_or(0, |&length| length as usize))
     }
 
-    /// What CasADi reads.
+    /// The pattern in CasADi's format.
     pub fn compressed(&self) -> &[i64] {
         &self.compressed
     }
@@ -97,7 +97,7 @@ fn swap_rows_and_columns(entries: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
     entries.into_iter().map(|(row, column)| (column, row)).collect()
 }
 
-/// Which entries of a matrix may differ from zero.
+/// The entries of a matrix that may be non-zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dependence {
     columns: usize,
@@ -105,24 +105,24 @@ pub struct Dependence {
 }
 
 impl Dependence {
-    /// Nothing but zeros.
+    /// A zero matrix.
     pub fn zero(rows: usize, columns: usize) -> Self {
         Self { columns, related: vec![false; rows * columns] }
     }
 
-    /// How many rows there are.
+    /// The number of rows.
     pub fn rows(&self) -> usize {
         self.related.len().checked_div(self.columns).unwrap_or(0)
     }
 
-    /// Nothing in a row is zero.
+    /// Marks a row as dense.
     pub fn fill(&mut self, row: usize) {
         if let Some(related) = self.related.get_mut(row * self.columns..(row + 1) * self.columns) {
             related.fill(true);
         }
     }
 
-    /// The products of what is in two rows of `other`, in both orders.
+    /// Adds the products of the entries of two rows of `other`, in both orders.
     pub fn add_row_products(&mut self, other: &Self, one: usize, two: usize) {
         let columns = self.columns;
         for a in (0..columns).filter(|&a| other.contains(one, a)) {
@@ -143,14 +143,14 @@ impl Dependence {
         self.row(row).get(column).copied().unwrap_or(false)
     }
 
-    /// An entry may differ from zero.
+    /// Marks an entry as possibly non-zero.
     pub fn set(&mut self, row: usize, column: usize) {
         if let Some(related) = self.related.get_mut(row * self.columns + column) {
             *related = true;
         }
     }
 
-    /// What is in `row` of `other` is in `to` too; whether that is news.
+    /// Adds the entries of `row` of `other` to the row `to`; returns whether an entry is new.
     pub fn add_row(&mut self, to: usize, other: &Self, row: usize) -> bool {
         let mut news = false;
         let range = to * self.columns..(to + 1) * self.columns;

@@ -1,13 +1,13 @@
-//! The states nearest to given ones that satisfy the invariants of a model.
+//! Consistent states: the states nearest to given ones that satisfy the invariants of a model.
 //!
 //! ```text
 //! min ½ |x − x̂|²    with  y(x, p, t) = 0,  x_j = x̂_j of those that are held
 //! ```
 //!
-//! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free,
-//! `x ← x̂ + G⁺ (G (x − x̂) − y)`. `G = L Q` by Gram and Schmidt, twice, shows which invariant
-//! depends on those before it. One of states that are held alone is nobody's concern if they
-//! satisfy it.
+//! Gauss-Newton method: with `G = ∂y/∂x` in the columns of free states,
+//! `x ← x̂ + G⁺ (G (x − x̂) − y)`. The factorisation `G = L Q` by Gram-Schmidt with
+//! reorthogonalisation shows which invariant depends on the preceding ones. An invariant of fixed
+//! states only is ignored if they satisfy it.
 
 use super::{Constrained, Inconsistent};
 use crate::error::Argument;
@@ -20,12 +20,12 @@ use crate::structure::name_matches;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// Iterations after which the values are given up.
+/// Maximal number of iterations.
 const MAX_ITERATIONS: usize = 200;
 /// The size of a state that is zero.
 const MIN_STATE_SIZE: f64 = 1e-30;
 
-/// States that satisfy the invariants of a model, nearest to given ones.
+/// Computes the states nearest to given ones that satisfy the invariants of a model.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -61,29 +61,29 @@ impl<M: Constrained> Default for Consistent<M> {
 /// The function of the invariants of a model.
 type Invariants<M> = <M as Constrained>::Invariants;
 
-/// What an iteration works with.
+/// The workspace of an iteration.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 struct ConsistencyWorkspace<M: Constrained, T: Real> {
     v: ArrayV<Invariants<M>, T>,
     y: ArrayY<Invariants<M>, T>,
     jacobian: <Invariants<M> as Function>::Jacobian<T>,
-    /// `G`, and then `Q`.
+    /// `G`, then `Q`.
     rows: MatrixYX<Invariants<M>, T>,
     /// `L`
     lower: MatrixYY<Invariants<M>, T>,
-    /// `Σ |G_ij| |x_j|` over the states that are held; zero if there are none.
+    /// `Σ |G_ij| |x_j|` over the fixed states; zero without fixed states.
     held_magnitude: ArrayY<Invariants<M>, T>,
     correction: ArrayX<M, T>,
 }
 
 impl<M: Constrained> Consistent<M> {
-    /// All states are free.
+    /// Returns a solver with all states free.
     pub fn new() -> Self {
         Self { held: ArrayX::<M, bool>::from_fn(|_| false), model: PhantomData }
     }
 
-    /// Holds a state at the value that is given: `x[0]`, or all of an array or a struct, `x`.
+    /// Fixes a state at its given value: `x[0]`, or all elements of an array or struct, `x`.
     ///
     /// # Errors
     /// [`Inconsistent::NoSuchState`]
@@ -97,10 +97,11 @@ impl<M: Constrained> Consistent<M> {
         if iterate { Ok(self) } else { Err(Inconsistent::NoSuchState { name }) }
     }
 
-    /// The states nearest to `x`, in the sum of squares.
+    /// Returns the states nearest to `x` in the Euclidean norm.
     ///
     /// # Errors
-    /// [`Inconsistent`]; of a `x` far from the constraints also where there are such states.
+    /// [`Inconsistent`]; far from the constraints the iteration may fail although consistent states
+    /// exist.
     pub fn solve<T: Real>(
         &self,
         x: &VectorX<M, T>,
@@ -122,7 +123,7 @@ impl<M: Constrained> Consistent<M> {
             work.linearise(&self.held, &iterate)?;
             work.factorise()?;
             let change = work.gauss_newton_step(x, &mut iterate);
-            // Once it is at rounding, it does not shrink any more.
+            // At rounding level the change stagnates.
             if change <= 4.0 * epsilon || (change < 1e3 * epsilon && change > 0.5 * last_change) {
                 return Ok(iterate);
             }
@@ -135,7 +136,7 @@ impl<M: Constrained> Consistent<M> {
     }
 }
 
-/// The equation that an invariant comes from, and which derivative of it that is.
+/// Returns the equation of an invariant, and the order of its derivative.
 fn equation_and_derivative<M: Dae>(output: usize) -> (u32, u32) {
     M::STRUCTURE.reduction.and_then(|reduction| reduction.invariant(output)).unwrap_or((output as u32, 0))
 }
@@ -182,7 +183,7 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
         Err(Inconsistent::NonFinite { equation, derivative, value })
     }
 
-    /// `G = L Q`
+    /// Factorises `G = L Q`.
     fn factorise(&mut self) -> Result<(), Inconsistent> {
         let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
         self.lower.as_mut_slice().fill(T::ZERO);
@@ -208,7 +209,8 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
                 }
             }
             let remaining_norm = norm(&self.rows);
-            // What remains of equal rows is rounding; squares of it say whether anything does.
+            // The remainder of dependent rows consists of rounding errors, up to the square root of
+            // ε relative to the row.
             let independent = remaining_norm.to_f64() * remaining_norm.to_f64()
                 > T::EPSILON * row_norm.to_f64() * row_norm.to_f64();
             if !independent {
@@ -224,13 +226,13 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
         Ok(())
     }
 
-    /// The next iterate, and by how much it moved, relative to the size of the states; NaN if it is
-    /// not finite.
+    /// Computes the next iterate; returns its change relative to the size of the states, or NaN if
+    /// it is not finite.
     fn gauss_newton_step(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
         let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
         let (given, iterate) = (given.as_slice(), found.as_mut_slice());
         self.correction.as_mut().fill(T::ZERO);
-        // `y` becomes `L⁻¹ y`; the part of `x − x̂` in the rows of `Q` is taken away by it.
+        // Replaces `y` by `L⁻¹ y`, and subtracts the component of `x − x̂` in the rows of `Q`.
         for i in 0..ny {
             let mut value = self.y[i];
             for j in 0..i {
@@ -251,14 +253,14 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
             size = size.max(next.to_f64().abs());
             iterate[state] = next;
         }
-        // A maximum does not show what is not a number.
+        // A maximum does not preserve NaN.
         if find_non_finite(iterate).is_some() {
             return f64::NAN;
         }
         if size > 0.0 { change / size } else { change }
     }
 
-    /// The invariant that is violated most.
+    /// Returns the invariant with the largest violation.
     fn largest_violation(&self) -> (usize, f64) {
         let mut largest = (0, 0.0f64);
         for (output, value) in self.y.as_ref().iter().enumerate() {

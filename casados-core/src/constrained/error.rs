@@ -1,9 +1,9 @@
-//! Why there are no consistent values.
+//! Errors of consistent states.
 
 use crate::error::Argument;
 use core::fmt;
 
-/// Why [`Consistent`](super::Consistent) found no values.
+/// The reason why [`Consistent`](super::Consistent) found no states.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -33,51 +33,51 @@ use core::fmt;
 pub enum Inconsistent {
     /// No state has this name.
     NoSuchState {
-        /// The name.
+        /// The unknown name.
         name: &'static str,
     },
-    /// An argument has an element that is infinite or NaN.
+    /// An input has an element that is infinite or NaN.
     NonFiniteInput {
-        /// The argument.
+        /// The input.
         argument: Argument,
-        /// The element.
+        /// Index of the element.
         index: usize,
-        /// What the model calls it; empty of the time.
+        /// Name of the element in the model; empty for the time.
         name: &'static str,
-        /// Its value.
+        /// Value of the element.
         value: f64,
     },
-    /// An invariant or its derivatives are infinite or NaN.
+    /// An invariant or one of its derivatives is infinite or NaN.
     NonFinite {
-        /// The equation that the invariant comes from.
+        /// Equation of the constraint that the invariant comes from.
         equation: u32,
-        /// Which derivative of it the invariant is.
+        /// Order of the derivative of the constraint.
         derivative: u32,
         /// The value.
         value: f64,
     },
-    /// The derivatives of an invariant by the states that are free depend on those of the
-    /// invariants before it.
+    /// The derivatives of an invariant by the free states depend linearly on those of the preceding
+    /// invariants.
     Dependent {
-        /// The equation that the invariant comes from.
+        /// Equation of the constraint that the invariant comes from.
         equation: u32,
-        /// Which derivative of it the invariant is.
+        /// Order of the derivative of the constraint.
         derivative: u32,
-        /// By how much it is violated there.
+        /// Violation of the invariant.
         residual: f64,
     },
-    /// The iteration does not settle.
+    /// The iteration did not converge.
     NotConverged {
-        /// The equation of the invariant that is violated most.
+        /// Equation of the constraint with the largest violation.
         equation: u32,
-        /// Which derivative of it the invariant is.
+        /// Order of the derivative of the constraint.
         derivative: u32,
-        /// By how much.
+        /// The largest violation.
         residual: f64,
     },
 }
 
-/// An invariant by the equation it comes from.
+/// Displays an invariant by its equation.
 struct Invariant(u32, u32);
 
 impl fmt::Display for Invariant {

@@ -1,6 +1,6 @@
 //! The projection of a state onto the invariants, and its derivatives.
 //!
-//! The state nearest to `x̂` on which the invariants `y` vanish, with multipliers `ν`:
+//! The state nearest to `x̂` at which the invariants `y` vanish, with multipliers `ν`:
 //!
 //! ```text
 //! F(x, ν; x̂, p, t) = (x − x̂ + Gᵀν, y) = 0        G = ∂y/∂x        K = ∂F/∂(x, ν)
@@ -8,7 +8,7 @@
 //!
 //! Directions: `K d(x, ν) = dx̂ − F_p dp`. Adjoint: `Kᵀμ = (λ, 0)`, then `λ_x̂` are the first
 //! elements of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, p)/dw`. The
-//! macro writes `F` and its derivatives.
+//! macro generates `F` and its derivatives.
 
 use super::Projectable;
 use crate::error::{Error, Place, Quantity};
@@ -19,20 +19,20 @@ use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Shape, entry, update_entry};
 use bytemuck::Zeroable;
 
-/// Iterations of Newton's method after which the projection is given up.
+/// Maximal number of Newton iterations.
 const MAX_ITERATIONS: usize = 30;
 
-/// `F`
+/// The function `F`.
 pub(super) type ProjectionFunction<M> = <M as Projectable>::Projection;
-/// How many equations `F` has.
+/// Number of equations of `F`.
 pub(super) const fn equation_count<M: Projectable>() -> usize {
     <ProjectionFunction<M> as Function>::Outputs::NY
 }
-/// Where `x̂` begins among the variables `(ẋ, x, ν, x̂, p, t)` of `F`.
+/// Index of `x̂` among the variables `(ẋ, x, ν, x̂, p, t)` of `F`.
 const fn given_states_offset<M: Projectable>() -> usize {
     M::Shape::NX + equation_count::<M>()
 }
-/// Where `p` begins.
+/// Index of `p`.
 const fn parameters_offset<M: Projectable>() -> usize {
     given_states_offset::<M>() + M::Shape::NX
 }
@@ -44,14 +44,14 @@ pub(super) struct Kkt<M: Projectable, T: Real> {
     v: ArrayV<ProjectionFunction<M>, T>,
     f: ArrayY<ProjectionFunction<M>, T>,
     jacobian: <ProjectionFunction<M> as Function>::Jacobian<T>,
-    /// `K`, and then its factors: `L` with a diagonal of ones, and `U`.
+    /// `K`, then its factors: `L` with unit diagonal, and `U`.
     factors: MatrixYY<ProjectionFunction<M>, T>,
-    /// The row that was exchanged with each.
+    /// The row that was swapped with each row.
     pivot_rows: ArrayY<ProjectionFunction<M>, usize>,
 }
 
 impl<M: Projectable, T: Real> Kkt<M, T> {
-    /// Projects `x`, which becomes the nearest state with vanishing invariants, and factorises `K`
+    /// Projects `x` onto the nearest state at which the invariants vanish, and factorises `K`
     /// there.
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
                 }
             }
             let relative_change = if size > 0.0 { moved / size } else { moved };
-            // Once it is at rounding, it does not shrink any more.
+            // At rounding level the change stagnates.
             if relative_change <= 4.0 * T::EPSILON
                 || (relative_change < 1e3 * T::EPSILON && relative_change > 0.25 * last_change)
             {
@@ -92,7 +92,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         Err(self.largest_violation_error())
     }
 
-    /// `F`, and `K` with its factors.
+    /// Evaluates `F` and `K`, and factorises `K`.
     fn linearise(&mut self) -> Result<(), Error> {
         let (nx, count) = (M::Shape::NX, equation_count::<M>());
         <ProjectionFunction<M> as Function>::value_jacobian::<T>(&self.v, &mut self.f, &mut self.jacobian);
@@ -109,11 +109,13 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         if finite && self.factorise() { Ok(()) } else { Err(self.largest_violation_error()) }
     }
 
+    /// Checks the derivatives by the parameters.
+    ///
     /// # Errors
-    /// [`Error::NonFiniteModel`] where the invariants have a value, but no derivative by a
-    /// parameter.
+    /// [`Error::NonFiniteModel`] if the invariants have finite values, but a derivative by a
+    /// parameter is not finite.
     pub fn check_parameters(&self) -> Result<(), Error> {
-        // Of the invariants, if they have one; those of `Gᵀν` are in the rows before.
+        // Invariants are reported first; the preceding rows are those of `Gᵀν`.
         let mut non_finite: Option<(usize, T)> = None;
         self.visit_parameter_jacobian(|row, _, value| {
             if !value.is_finite() && non_finite.is_none_or(|(last, _)| last < row) {
@@ -127,7 +129,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         Err(Error::NonFiniteModel { quantity, equation, value: value.to_f64(), at })
     }
 
-    /// What is violated most.
+    /// Returns the error with the largest violation.
     fn largest_violation_error(&self) -> Error {
         let (mut largest_index, mut residual) = (0, 0.0f64);
         for (output, value) in self.f.as_ref()[M::Shape::NX..].iter().enumerate() {
@@ -140,7 +142,8 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         Error::NotProjected { equation, derivative, residual }
     }
 
-    /// Gaussian elimination with partial pivoting; whether the matrix is regular.
+    /// Factorises by Gaussian elimination with partial pivoting; returns whether the matrix is
+    /// regular.
     fn factorise(&mut self) -> bool {
         let count = equation_count::<M>();
         for step in 0..count {
@@ -174,7 +177,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         true
     }
 
-    /// `b = K⁻¹ b`
+    /// `b ← K⁻¹ b`
     pub fn solve(&self, b: &mut ArrayY<ProjectionFunction<M>, T>) {
         let count = equation_count::<M>();
         for step in 0..count {
@@ -193,7 +196,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         }
     }
 
-    /// `b = K⁻ᵀ b`
+    /// `b ← K⁻ᵀ b`
     fn solve_transposed(&self, b: &mut ArrayY<ProjectionFunction<M>, T>) {
         let count = equation_count::<M>();
         for row in 0..count {
@@ -212,7 +215,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         }
     }
 
-    /// `d(x, ν)` where the given state changes by `change` and the parameters by `dp`.
+    /// Returns `d(x, ν)` for a change of the given state and a change `dp` of the parameters.
     pub fn direction(
         &self,
         state_direction: impl Fn(usize) -> T,
@@ -230,7 +233,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         b
     }
 
-    /// `μ` with `Kᵀμ = (λ, 0)`.
+    /// Returns `μ` with `Kᵀμ = (λ, 0)`.
     pub fn multipliers(&self, lambda: &VectorX<M, T>) -> ArrayY<ProjectionFunction<M>, T> {
         let lambda = lambda.as_slice();
         let mut mu =
@@ -249,7 +252,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         }
     }
 
-    /// The entries of the lower triangle of `∇²(μᵀF)` in the order of its pattern.
+    /// Evaluates the lower triangle of `∇²(μᵀF)` in the order of its pattern.
     pub fn hessian(
         &self,
         mu: &ArrayY<ProjectionFunction<M>, T>,
@@ -259,12 +262,12 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 }
 
-/// The equation of an invariant, and which derivative of it this is.
+/// Returns the equation of an invariant, and the order of its derivative.
 fn invariant<M: Projectable>(index: usize) -> (u32, u32) {
     M::STRUCTURE.reduction.and_then(|reduction| reduction.invariant(index)).unwrap_or((0, 0))
 }
 
-/// Exchanges two elements.
+/// Swaps two elements.
 fn exchange<T: Copy>(b: &mut [T], first: usize, second: usize) {
     if let (Some(&one), Some(&pivot_element)) = (b.get(first), b.get(second)) {
         b[first] = pivot_element;
@@ -272,14 +275,14 @@ fn exchange<T: Copy>(b: &mut [T], first: usize, second: usize) {
     }
 }
 
-/// A variable of `F` that a second derivative is taken by: an element of `(x, ν)`, or a parameter.
-/// `F` is linear in `x̂`.
+/// A variable of second derivatives of `F`: an element of `(x, ν)`, or a parameter. `F` is linear
+/// in `x̂`.
 pub(super) enum Variable {
     Unknown(usize),
     Parameter(usize),
 }
 
-/// Which variable an index of the pattern of `∇²(μᵀF)` is.
+/// Returns the variable of an index in the pattern of `∇²(μᵀF)`.
 pub(super) fn variable<M: Projectable>(index: usize) -> Variable {
     match index.checked_sub(parameters_offset::<M>()) {
         Some(parameter) => Variable::Parameter(parameter),

@@ -1,4 +1,4 @@
-//! Models with constraints, whose index the macro reduced.
+//! Models with constraints after index reduction by the macro.
 
 mod consistent;
 mod error;
@@ -11,12 +11,11 @@ pub use consistent::Consistent;
 pub use error::Inconsistent;
 pub use projected::Projected;
 
-/// A model that was written with constraints `g(x, p, t) = 0`, of which `#[dae(index_reduction)]`
-/// made equations of index 1; what it did is in
-/// [`Structure::reduction`](crate::structure::Structure::reduction).
+/// A model with constraints `g(x, p, t) = 0`, which `#[dae(index_reduction)]` reduced to index 1;
+/// see [`Structure::reduction`](crate::structure::Structure::reduction).
 ///
-/// Start values have to satisfy the invariants: [`Consistent`] finds such values. In a problem of
-/// optimal control they are imposed at one node.
+/// Initial states must satisfy the invariants; [`Consistent`] computes such states. In an optimal
+/// control problem the invariants are imposed at one node.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -48,11 +47,11 @@ pub use projected::Projected;
     note = "those of a `#[dae(index_reduction)]` are its constraints and their derivatives"
 )]
 pub trait Constrained: Dae {
-    /// Constraints and their lower derivatives `y(x, p, t)`, zero on every solution.
+    /// Constraints and their lower derivatives `y(x, p, t)`; zero on every solution.
     type Invariants: Function<Shape = Self::Shape>;
 }
 
-/// A model of `#[dae(index_reduction(projection))]`: the macro wrote the equations of the
+/// A model of `#[dae(index_reduction(projection))]`: the macro generates the equations of the
 /// projection onto its invariants, for [`Projected`].
 ///
 /// ```
@@ -69,7 +68,7 @@ pub trait Constrained: Dae {
     note = "`#[dae(index_reduction(projection))]` writes them"
 )]
 pub trait Projectable: Constrained {
-    /// `(x − x̂ + Gᵀν, y)` of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: a function with `ν` in the
-    /// place of `z` and `x̂` in that of `u`.
+    /// `(x − x̂ + Gᵀν, y)` as a function of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`; `ν` takes the
+    /// place of `z`, and `x̂` that of `u`.
     type Projection: Function;
 }

@@ -1,4 +1,4 @@
-//! An integrator whose results satisfy the invariants.
+//! Integration with projection onto the invariants.
 
 use super::Projectable;
 use super::kkt::{Kkt, ProjectionFunction, Variable, variable};
@@ -16,16 +16,16 @@ use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// An integrator with the projection onto the invariants of its model at the end of every call:
+/// An integrator with projection onto the invariants of its model at the end of every call:
 ///
 /// ```text
 /// x₊ = argmin ½ |x − x̂(x₀, u, p)|²    with  y(x, p, t + h) = 0
 /// ```
 ///
-/// where `x̂` is what the integrator returns. Derivatives of first and second order are those of
-/// both maps together, and exact. For a projection after every step the integrator takes one step
-/// a call. `adjoint` and `hessian` integrate once more, since the projection has to be known first.
-/// Algebraic states are those of the integrator, and integrals too.
+/// where `x̂` is the result of the integrator. Derivatives of first and second order are exact
+/// derivatives of the composed map. For a projection after every step, let the integrator take one
+/// step per call. `adjoint` and `hessian` integrate twice, since they need the projection first.
+/// Algebraic states and integrals are those of the integrator.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -50,7 +50,7 @@ use core::marker::PhantomData;
 #[non_exhaustive]
 pub struct Projected<I: Integrator<Model: Projectable>> {
     integrator: I,
-    /// Those that were set.
+    /// The parameters, if they were set.
     parameters: Option<VectorP<I::Model, I::Number>>,
     time: I::Number,
     nominal: NominalStorage<I, NominalMemory<I::Model, I::Number>>,
@@ -61,7 +61,7 @@ pub struct Projected<I: Integrator<Model: Projectable>> {
 
 type NominalStorage<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
 
-/// What every call needs.
+/// The memory of all calls.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 struct NominalMemory<M: Projectable, T: Real> {
@@ -76,27 +76,27 @@ impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
     type Of<const C: usize> = Adjoint<M, T, C>;
 }
 
-/// Results of `hessian`, and what they are made of.
+/// Results of `hessian`, and its scratch memory.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 struct HessianMemory<M: Projectable, T: Real> {
     result: Hessian<M, T>,
-    /// `d(x, ν)/dw`: columns by `x₀`, `u` and `p`.
+    /// `d(x, ν)/dw`: columns of `x₀`, `u` and `p`.
     by_x: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYX<M::Shape, T>,
     by_u: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYU<M::Shape, T>,
     by_p: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYP<M::Shape, T>,
     hessian_entries: <ProjectionFunction<M> as Function>::Hessian<T>,
 }
 
-/// `A + B` element by element.
+/// `A + B`, element by element.
 fn add_assign<T: Real>(to: &mut [T], from: &[T]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *to + *from);
 }
 
 impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I> {
-    /// The integrator with a projection. Its parameters have to be set here: without them there is
-    /// [`Error::ParametersNotSet`] of a model that has some. Its time is the one that is set here,
-    /// or zero.
+    /// Returns an integrator with projection. Its parameters must be set here: otherwise models
+    /// with parameters return [`Error::ParametersNotSet`]. Its time is set by `set_time`, and zero
+    /// by default.
     pub fn new(integrator: I) -> Self {
         Self {
             integrator,
@@ -109,13 +109,13 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         }
     }
 
-    /// The integrator itself. Before each call it is given the parameters and the time that are set
-    /// here.
+    /// Returns the integrator. Every call overwrites its parameters and its time with those of the
+    /// projection.
     pub fn integrator(&mut self) -> &mut I {
         &mut self.integrator
     }
 
-    /// Before a call: the integrator has the parameters and the time of the projection.
+    /// Sets the parameters and the time of the integrator before a call.
     ///
     /// # Errors
     /// [`Error::ParametersNotSet`]
@@ -131,7 +131,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         }
     }
 
-    /// Integrates, and projects the end.
+    /// Integrates, and projects the final state.
     fn project(
         &mut self,
         x0: &VectorX<M, T>,
@@ -148,7 +148,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
     }
 }
 
-/// `V ← dx₊/dw` of one block of columns; `of(row, column)` receives the rows of `d(x, ν)/dw`.
+/// `V ← dx₊/dw` for one block of columns; `of(row, column)` receives the rows of `d(x, ν)/dw`.
 fn write_projected_columns<M: Projectable, T: Real, V: Matrix<T>>(
     kkt: &Kkt<M, T>,
     block: &mut V,
@@ -293,7 +293,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
 }
 
 impl<M: Projectable, T: Real> HessianMemory<M, T> {
-    /// What the projection does to derivatives.
+    /// Applies the projection to derivatives.
     fn project_derivatives(
         &mut self,
         kkt: &Kkt<M, T>,
@@ -363,14 +363,14 @@ fn subtract_rank_two<M: Dae, T: Real>(
     subtract_rank_two_block(&mut result.h_pp, p, p, value);
 }
 
-/// What belongs to `x₀`, `u` and `p`.
+/// Splits a row into the parts of `x₀`, `u` and `p`.
 fn split_row<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
     let (x, rest) = row.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
     let (u, p) = rest.split_at_checked(M::Shape::NU).unwrap_or_default();
     [x, u, p]
 }
 
-/// The same of one block, with the parts of its rows and of its columns.
+/// [`subtract_rank_two`] for one block, with the parts of its rows and columns.
 fn subtract_rank_two_block<T: Real, V: Matrix<T>>(
     matrix: &mut V,
     rows: [&[T]; 2],

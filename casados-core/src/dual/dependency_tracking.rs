@@ -1,4 +1,4 @@
-//! A number that knows which variables it depends on.
+//! Dependency tracking: a number type that records on which variables each number depends.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,15 +14,15 @@ std::thread_local! {
     static TAPE: RefCell<DependencyTape> = const { RefCell::new(DependencyTape::empty()) };
 }
 
-/// What the numbers of one run depend on, and whether the run looked at one that depends on
-/// anything.
+/// The dependencies of the numbers of one run, and whether the run read the value of a number that
+/// depends on a variable.
 #[derive(Debug)]
 pub(super) struct DependencyTape {
-    /// Words of one set of variables.
+    /// The number of words of a set of variables.
     words_per_set: usize,
     /// One set for each number; the first is empty.
     sets: Vec<u64>,
-    /// Symmetric: which pairs of variables have a second derivative of some number.
+    /// Symmetric: the pairs of variables with respect to which some number has a second derivative.
     interactions: Vec<u64>,
     value_was_read: bool,
 }
@@ -31,7 +31,7 @@ pub(super) struct DependencyTape {
 pub(super) struct VariableSet(Vec<u64>);
 
 impl VariableSet {
-    /// Whether a variable is in it.
+    /// Whether a variable is in the set.
     pub(super) fn contains(&self, variable: usize) -> bool {
         has_bit(&self.0, variable)
     }
@@ -41,13 +41,13 @@ fn has_bit(words: &[u64], index: usize) -> bool {
     words.get(index / 64).is_some_and(|word| word >> (index % 64) & 1 == 1)
 }
 
-/// How a number comes from two others, as far as second derivatives go.
+/// The structure of the second derivatives of a binary operation.
 #[derive(Clone, Copy)]
 enum Kind {
     Linear,
-    /// `∂²/∂a∂b` alone.
+    /// Only `∂²/∂a∂b`.
     Product,
-    /// All but `∂²/∂a²`.
+    /// All except `∂²/∂a²`.
     Quotient,
     General,
 }
@@ -57,8 +57,8 @@ impl DependencyTape {
         Self { words_per_set: 0, sets: Vec::new(), interactions: Vec::new(), value_was_read: false }
     }
 
-    /// Records a run with so many variables. A run inside a run would take the tape away from it:
-    /// none happens, because a model does not differentiate itself.
+    /// Records a run with this number of variables. Nested runs would replace the tape; they do not
+    /// occur, since a model does not differentiate itself.
     pub(super) fn record(variables: usize, run: impl FnOnce()) -> Self {
         let words = variables.div_ceil(64);
         let tape = Self {
@@ -120,12 +120,11 @@ impl DependencyTape {
     }
 }
 
-/// A number that knows which variables it depends on. Outside of a run that records, it is a
-/// number.
+/// A number with its dependencies. Outside of a recorded run it is an ordinary number.
 #[derive(Clone, Copy)]
 pub struct Tracked {
     value: f64,
-    /// Its set on the tape; zero is the empty set.
+    /// The index of its set on the tape; zero is the empty set.
     node: usize,
 }
 
@@ -164,7 +163,7 @@ impl Tracked {
         Self { value, node: self.node }
     }
 
-    /// The value, for a decision.
+    /// The value, read for a decision.
     fn decision_value(&self) -> f64 {
         if self.node != 0 {
             TAPE.with_borrow_mut(|tape| tape.value_was_read = true);
@@ -369,7 +368,7 @@ macro_rules! functions {
 
 impl DualNum for Tracked {
     type Primitive = f64;
-    // Second derivatives are tracked too.
+    // Second derivatives are tracked as well.
     const NDERIV: usize = 2;
     type InnerDual = f64;
 

@@ -1,10 +1,10 @@
-//! Models written over dual numbers: derivatives at run time, by the arithmetic of [`num_dual`].
+//! Models over dual numbers: derivatives at run time, by the arithmetic of [`num_dual`].
 //!
-//! Such a model may be any Rust at all: branches on data, tables, other crates. First derivatives
-//! are forward duals, second ones hyper-duals. One evaluation yields the derivatives in the
-//! direction of several variables at once where no equation depends on two of them; see [`Passes`].
+//! Such a model may be any Rust code: branches on data, tables, other crates. First derivatives use
+//! forward duals, second ones hyper-duals. One evaluation gives the derivatives with respect to
+//! several variables if no equation depends on two of them; see [`Passes`].
 //!
-//! The patterns of a dual model are dense: what it depends on is known only when it has run.
+//! The patterns of a dual model are dense, since its dependencies are known at run time only.
 
 mod dependency_tracking;
 mod passes;
@@ -23,8 +23,8 @@ use num_dual::{Dual64, HyperDual64};
 use std::sync::OnceLock;
 use structure::{hessian_entry, jacobian_entry};
 
-/// A model over dual numbers: written by `#[dae]` and `#[ode]` on a function that is generic over
-/// `DualNum`.
+/// A model over dual numbers: implemented by `#[dae]` and `#[ode]` for a function that is generic
+/// over `DualNum`.
 ///
 /// ```
 /// use casados::dual::{DualModel, DualNum};
@@ -51,18 +51,18 @@ use structure::{hessian_entry, jacobian_entry};
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub trait DualModel: Dae {
-    /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and hands
-    /// over the equations.
+    /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and passes
+    /// the equations to `equation`.
     fn evaluate<T>(variable: impl Fn(usize) -> T, equation: impl FnMut(usize, T))
     where
         T: DualNum<Primitive = f64> + DualNumCopy;
 
-    /// Where the passes of this model are kept once they are known.
+    /// Storage of the passes of this model.
     fn passes() -> &'static OnceLock<Passes>;
 }
 
-/// The passes of a model, found when it is first differentiated. Which point it is differentiated
-/// at does not matter: a model that looks at its variables gets dense passes.
+/// The passes of a model, computed on its first differentiation. They are independent of the point:
+/// a model whose control flow depends on its variables gets dense passes.
 fn colouring<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
     M::passes().get_or_init(|| {
         Passes::colour_model(M::Shape::NV, M::Shape::NK, point, |variable, equation| {
@@ -98,7 +98,7 @@ pub fn residual_jacobian<M: DualModel, S: Lanes>(
     }
 }
 
-/// `f(v)` and `∂f/∂v v'`, by one dual number for each variable.
+/// `f(v)` and `∂f/∂v v'`, with one dual number for each variable.
 pub fn tangent<M: DualModel, S: Lanes>(v: &ArrayV<M, Tangent<S>>, f: &mut ArrayK<M, Tangent<S>>) {
     let cells = |number: S| {
         let mut cell: S::Cell = Zeroable::zeroed();
@@ -174,7 +174,7 @@ pub fn hessian<M: DualModel, S: Lanes>(
     }
 }
 
-/// Every structural non-zero of the Jacobian at one point.
+/// Visits every structural non-zero of the Jacobian at one point.
 fn jacobian_entries<M: DualModel>(point: impl Fn(usize) -> f64, mut entry: impl FnMut(usize, usize, f64)) {
     let passes = colouring::<M>(&point);
     for colour in 0..passes.len() {

@@ -1,27 +1,27 @@
-//! Which variables are differentiated in one evaluation.
+//! Colouring: the variables that are differentiated in one evaluation.
 
 use super::dependency_tracking::{DependencyTape, Tracked};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A colouring of the variables: no equation depends on two variables of one colour, so one
-/// evaluation with all of them seeded gives each of these derivatives apart. Pairs of colours give
-/// second derivatives in the same way.
+/// A colouring of the variables: no equation depends on two variables of one colour, so that one
+/// evaluation, with all variables of a colour seeded, separates their derivatives. Pairs of colours
+/// give second derivatives in the same way.
 ///
-/// If the model looks at its variables (a comparison, a value taken out), what it depends on at one
-/// point need not be what it depends on at another. Then every variable has a colour of its own.
+/// If the control flow of a model depends on its variables (a comparison, a value read), the
+/// dependencies at one point do not hold at others. Then every variable has its own colour.
 #[derive(Debug)]
 pub struct Passes {
-    /// Colour of each variable; `t` has none.
+    /// The colour of each variable; `t` has none.
     colours: Vec<usize>,
-    /// For each colour and row, the variable of that colour that the row depends on.
+    /// For each colour and row, the variable of that colour on which the row depends.
     columns: Vec<Vec<Option<usize>>>,
     /// Pairs of colours with a second derivative.
     pairs: Vec<(usize, usize)>,
 }
 
 impl Passes {
-    /// Runs the model on numbers that track what they depend on. `variables` counts `t`.
+    /// Runs the model with dependency tracking. `variables` includes `t`.
     pub(super) fn colour_model(
         variables: usize,
         equations: usize,
@@ -45,7 +45,7 @@ impl Passes {
         Self::colour_greedily(columns, &depends, interacts)
     }
 
-    /// Colours greedily: each variable takes the first colour that is free.
+    /// Greedy colouring: each variable takes the first free colour.
     fn colour_greedily(
         variables: usize,
         depends: &[Vec<bool>],
@@ -83,13 +83,13 @@ impl Passes {
         Self { colours, columns, pairs }
     }
 
-    /// The number of evaluations that give the Jacobian.
+    /// The number of evaluations for the Jacobian.
     #[must_use]
     pub fn len(&self) -> usize {
         self.columns.len()
     }
 
-    /// Whether there is nothing to differentiate.
+    /// Whether there are no derivatives.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
@@ -101,12 +101,12 @@ impl Passes {
         &self.pairs
     }
 
-    /// Whether a variable is of a colour.
+    /// Whether a variable has this colour.
     pub(super) fn contains(&self, colour: usize, variable: usize) -> bool {
         self.colours.get(variable) == Some(&colour)
     }
 
-    /// The variable of a colour that an equation depends on.
+    /// The variable of a colour on which an equation depends.
     pub(super) fn column(&self, colour: usize, row: usize) -> Option<usize> {
         *self.columns.get(colour)?.get(row)?
     }

@@ -1,4 +1,4 @@
-//! Dense patterns, in the order that [`Structure`](crate::model::Structure) prescribes.
+//! Dense patterns, in the order of [`Structure`](crate::model::Structure).
 
 use crate::shape::Shape;
 
@@ -45,7 +45,7 @@ pub const fn hessian_pattern<const N: usize>() -> ([u32; N], [u32; N]) {
     (rows, columns)
 }
 
-/// Where an entry is in the Jacobian.
+/// The index of an entry in the Jacobian.
 pub fn jacobian_entry<M: Shape>(row: usize, column: usize) -> usize {
     let mut start = 0;
     for width in block_widths::<M>() {
@@ -57,13 +57,13 @@ pub fn jacobian_entry<M: Shape>(row: usize, column: usize) -> usize {
     0
 }
 
-/// Where the entry of two variables is in the Hessian.
+/// The index of the entry of two variables in the Hessian.
 pub fn hessian_entry(a: usize, b: usize) -> usize {
     let (row, column) = if a < b { (b, a) } else { (a, b) };
     row * (row + 1) / 2 + column
 }
 
-/// Numbers of columns of the five blocks.
+/// The numbers of columns of the five blocks.
 const fn block_widths<M: Shape>() -> [usize; 5] {
     [M::NX, M::NX, M::NZ, M::NU, M::NP]
 }

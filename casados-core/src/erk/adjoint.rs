@@ -1,4 +1,4 @@
-//! The discrete adjoint: backwards over the steps and over the stages of each.
+//! The discrete adjoint, computed backwards over the steps and their stages.
 //!
 //! ```text
 //! k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)      ξ̄_i = g_xᵀ k̄_i
@@ -16,32 +16,32 @@ use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;
 
-/// The adjoint variables of a step, one column per seed: `R` is the longest row, of which the first
-/// `columns` elements are used.
+/// The adjoint variables of a step, one column per seed. `R` is a row of maximal length, of which
+/// the first `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct AdjointSweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
-    /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the
-    /// current stage is in `dxi`, `ξ̄_i` in `dk`.
+    /// The memory of the forward sweep, which is never used at the same time: `dxi` holds `k̄_i` of
+    /// the current stage, `dk` the `ξ̄_i`.
     pub forward: Variation<M, E, R, S>,
     gradient: ArrayV<M, [E; 1]>,
     /// `(λ_n, λ_u, λ_p)`
     pub lambda: ArrayW<M, R>,
 }
 
-/// The `μ_i` of the stages of a step.
+/// The multipliers `μ_i` of the stages of a step.
 pub(super) type Multipliers<M, E, const S: usize> = [ArrayK<M, [E; 1]>; S];
 
-/// The way back over the steps.
+/// The backward sweep over the steps.
 pub(super) struct AdjointProblem<'a, M: Ode, E: Lanes, const S: usize> {
     pub scheme: &'a Scheme<M, E, S>,
     pub grid: &'a Grid<E>,
-    /// How many seeds there are.
+    /// Number of seeds.
     pub columns: usize,
 }
 
 impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
-    /// Seeds: of each state the columns.
+    /// Sets the seeds; `seed` is called with a state and a column.
     pub fn set_seeds(&mut self, columns: usize, seed: impl Fn(usize, usize) -> E) {
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
             for (column, value) in lambda.as_mut()[..columns].iter_mut().enumerate() {
@@ -50,8 +50,8 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
         }
     }
 
-    /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of
-    /// every stage for the Hessian. An integrand takes part if there is one seed.
+    /// Integrates backwards over all recorded steps; updates `lambda`. Stores the `μ_i` of every
+    /// stage in `multipliers` for the Hessian. With one seed it includes an integrand.
     pub fn integrate_backwards(
         &mut self,
         problem: AdjointProblem<'_, M, E, S>,
@@ -89,9 +89,9 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
             if columns == 1 {
                 let mut mu = ArrayK::<M, [E; 1]>::zeroed();
                 multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
-                // `∇(μᵀ f)` by reverse mode.
+                // Computes `∇(μᵀ f)` by reverse mode.
                 M::adjoint::<UnitStride<E>>(&point.v, &mu, gradient);
-                // By `ẋ` it is a multiple of `μ_i`, and nobody's.
+                // The derivative with respect to `ẋ` is a multiple of `μ_i`, which is not used.
                 let nx = M::Shape::NX;
                 let used = gradient.as_ref().as_flattened().get(nx..).unwrap_or_default();
                 point.check(used, Quantity::Adjoint, at, |variable| nx + variable)?;
@@ -135,7 +135,7 @@ kernels! { by run_plain;
         }
     }
 
-    /// `μ_i`, of the equations in place of the states.
+    /// Computes `μ_i`, in the order of the equations.
     fn multiplier [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         kbar: &'k ArrayX<M, R>,
@@ -147,7 +147,7 @@ kernels! { by run_plain;
         }
     }
 
-    /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.
+    /// Adds the parts of the gradient to `ξ̄_i` and `λ_w`.
     fn keep [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
         gradient: &'k ArrayV<M, [E; 1]>,
         xibar: &'k mut ArrayX<M, R>,
@@ -163,7 +163,7 @@ kernels! { by run_plain;
         }
     }
 
-    /// `ξ̄_i` and `λ_w` by products with the Jacobian, one evaluation for all seeds.
+    /// Computes `ξ̄_i` and `λ_w` by products with the Jacobian, evaluated once for all seeds.
     fn pull [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         jacobian: &'k M::Jacobian<[E; 1]>,
@@ -204,11 +204,11 @@ kernels! { by run_plain;
     }
 }
 
-/// `sums += a rows`, the first columns of them.
+/// `sums += a rows`, in the first `columns` columns.
 #[inline(always)]
 fn add_rows<A: Arithmetic, E: Lanes, R: Array<E>>(a: E, rows: &[R], sums: &mut [R], columns: usize) {
     if R::LEN == 1 {
-        // Numbers next to each other: no loop over columns.
+        // Adjacent numbers: one loop over all elements.
         return add::<A, E>(a, R::flat(rows), R::flat_mut(sums));
     }
     for (sum, row) in sums.iter_mut().zip(rows) {

@@ -1,4 +1,4 @@
-//! What computes: with single numbers one interval, with registers several of them side by side.
+//! The engine of explicit methods: for scalars one interval, for SIMD registers several intervals.
 
 use super::adjoint::{AdjointProblem, AdjointSweep, Multipliers};
 use super::forward::{Variation, copy_to_columns};
@@ -19,14 +19,14 @@ use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
-/// What a call answers, and the lanes for which it is good: those all of whose values were finite.
+/// The result of a call, and the lanes in which it is valid: those without a non-finite value.
 pub(crate) type MaskedResult<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
 
-/// The base of a call with derivatives, and where these are.
+/// The workspace after a call with derivatives, and the memory of the derivatives.
 type Differentiated<'a, M, E, const S: usize> =
     (&'a mut StepWorkspace<M, E, S>, &'a mut ForwardMemory<M, E, S>);
 
-/// The method, and the memory of its calls.
+/// The method and its memory.
 pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
     pub(super) scheme: Scheme<M, E, S>,
     pub(super) counts: EvaluationCounts,
@@ -46,7 +46,7 @@ pub(super) struct AdjointMemory<M: Ode, E: Lanes, const S: usize> {
     pub(super) result: Adjoint<M, E>,
 }
 
-/// Memory of as many directions or seeds as there are directions `w`.
+/// Memory of first-order derivatives, for as many columns as there are elements of `w`.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct ForwardMemory<M: Ode, E: Lanes, const S: usize> {
@@ -54,7 +54,7 @@ pub(super) struct ForwardMemory<M: Ode, E: Lanes, const S: usize> {
     pub(super) result: ForwardAdjoint<M, E>,
 }
 
-/// Memory of the second order, besides that of the first.
+/// Memory of second-order derivatives, besides that of the first order.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct HessianMemory<M: Ode, E: Lanes> {
@@ -67,7 +67,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         Self::with_scheme(Scheme::new(tableau))
     }
 
-    /// With memory that is empty until the first call.
+    /// Returns an engine with empty memory.
     pub(super) fn with_scheme(scheme: Scheme<M, E, S>) -> Self {
         Self {
             scheme,
@@ -81,7 +81,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         }
     }
 
-    /// Before a call: the state at the start, and the variables of the model.
+    /// Begins a call. Returns the initial state and the variables of the model, to be written.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -93,7 +93,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         Ok([x.as_mut(), point.variables_mut()])
     }
 
-    /// What the last call did.
+    /// Returns the statistics of the last call.
     pub fn statistics(&self) -> Statistics {
         let EvaluationCounts { steps, residuals, jacobians } = self.counts;
         Statistics { steps, residuals, jacobians, ..Statistics::default() }
@@ -139,7 +139,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     {
         let (base, ForwardMemory { sweep, result }) =
             self.differentiate(grid, forward_sweep, &mut NoIntegrand)?;
-        // With the Jacobian at hand the gradient is a product.
+        // The Jacobian is available: the gradient is a product with it.
         let AdjointSweep { forward, lambda: gradient, .. } = sweep;
         weigh::<M, E, _>(&forward.dx, lambda, &mut *gradient);
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &mut *result;
@@ -148,7 +148,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         Ok((base.point.non_finite.finite_lanes(), result))
     }
 
-    /// The derivatives, where they belong.
+    /// Computes the derivatives and writes them to the result.
     fn differentiate(
         &mut self,
         grid: &Grid<E>,
@@ -223,8 +223,8 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
         let scheme = &self.scheme;
 
-        // The adjoint first: then the forward sweep meets each stage with its multipliers known,
-        // and no derivative of a stage has to be kept.
+        // The adjoint sweep comes first, so that the forward sweep knows the multipliers of each
+        // stage and stores no derivatives of stages.
         let start = workspace.x;
         sweep.set_seeds(1, |x, _| lambda[x]);
         curvature.reset();
@@ -265,7 +265,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
 }
 
 kernels! { by run_plain;
-    /// The gradient `λᵀ dx`, of each direction in the first column.
+    /// The gradient `λᵀ dx`, in the first column of each direction.
     fn weigh [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
         dx: &'k ArrayX<M, ArrayW<M, E>>,
         lambda: &'k [E],
@@ -303,7 +303,7 @@ fn write_forward<M: Ode, E: Lanes, const S: usize>(
     Ok(())
 }
 
-/// The first column of rows to the parts of a gradient.
+/// Writes the first column of the rows to the parts of a gradient.
 fn write_gradient<E: Lanes, R: Array<E>>(
     rows: &[R],
     blocks: [&mut [E]; 3],

@@ -1,4 +1,4 @@
-//! First-order sensitivities along with the step: the variational equations of the stages.
+//! First-order sensitivities: the variational equations of the stages, integrated with the state.
 
 use super::non_finite::NonFiniteLanes;
 use super::scheme::{Grid, Scheme, is_zero};
@@ -14,8 +14,8 @@ use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// Derivatives of the state in the directions of the columns: `R` is the longest row, of which the
-/// first `columns` elements are used.
+/// Derivatives of the state in the directions of the columns. `R` is a row of maximal length, of
+/// which the first `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
@@ -30,9 +30,9 @@ pub(crate) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
 
 /// Directions in the space of `w = (x₀, u, p)`.
 pub(crate) trait Directions<M: Ode, E: Lanes>: Copy {
-    /// How many.
+    /// Number of directions.
     fn columns(self) -> usize;
-    /// `row += coefficient · (direction of w_i)`
+    /// `row += coefficient · (row i of the directions)`
     fn add_scaled(self, i: usize, coefficient: E, row: &mut [E]);
 }
 
@@ -53,7 +53,7 @@ impl<M: Ode, E: Lanes> Directions<M, E> for UnitDirections {
     }
 }
 
-/// Columns of a seed matrix, from `first`.
+/// Columns of a seed matrix, from `first` on.
 pub(super) struct SeedDirections<'a, M: Ode, T: Real, const C: usize> {
     pub seeds: &'a Seeds<M, T, C>,
     pub first: usize,
@@ -88,8 +88,8 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for SeedDirections<'_, M,
 }
 
 impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
-    /// All steps, from `x` to `x`, with the derivatives; `evaluate_stage` sees each stage when `k_i` and
-    /// `dξ_i` are known.
+    /// Integrates over all steps with the derivatives; updates the state of the workspace. Calls
+    /// `on_stage` at each stage with its `dξ_i`.
     pub fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -111,7 +111,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         Ok(())
     }
 
-    /// The stages of one step with their derivatives.
+    /// Computes the stages of one step and their derivatives.
     fn stages(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -135,7 +135,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         Ok(())
     }
 
-    /// `dk_i` by a Jacobian that is elsewhere.
+    /// Computes `dk_i` with a given Jacobian.
     #[cfg(feature = "alloc")]
     pub fn stage_derivative(
         &mut self,
@@ -161,7 +161,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         combine::<M, E, R, _>(&self.dx, h, weights, &self.dk, directions, &mut self.dxi);
     }
 
-    /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
+    /// `dx_n ← dx_n + h Σ_i b_i dk_i`
     pub fn advance(&mut self, scheme: &Scheme<M, E, S>, h: &E, directions: impl Directions<M, E>) {
         combine::<M, E, R, _>(&self.dx, h, &scheme.b, &self.dk, directions, &mut self.dxi);
         self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
@@ -169,7 +169,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
 }
 
 kernels! { by run_plain;
-    /// The directions, of each state a row.
+    /// Sets `dx` to the directions, one row per state.
     pub fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
         one: E,
         dx: &'k mut ArrayX<M, R>,
@@ -198,7 +198,7 @@ kernels! { by run_plain;
             }
             return add_entries::<A, M, E, R, D, S>(M::STRUCTURE.blocks[1], scheme, jacobian, dxi, directions, dk);
         }
-        // Entries by states lie row by row.
+        // Entries of states are in row order.
         let mut begin = M::STRUCTURE.blocks[1];
         for (equation, row) in scheme.equations.as_ref().iter().enumerate() {
             let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
@@ -231,7 +231,7 @@ kernels! { by run_plain;
         }
     }
 
-    /// See [`write`].
+    /// See [`copy_to_columns`].
     fn copy [E: Lanes, R: Array<E>, K: Matrix<E>] [E, R, K] <A>(
         rows: &'k [R],
         source: Range<usize>,
@@ -250,7 +250,7 @@ kernels! { by run_plain;
     }
 }
 
-/// `dk_i += …` of the entries of the Jacobian from one on.
+/// Adds the entries of the Jacobian from `first` on to `dk_i`.
 #[inline(always)]
 fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>, const S: usize>(
     first: usize,
@@ -278,7 +278,7 @@ fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>
     }
 }
 
-/// The same of single numbers: compiled once for the stages and the end.
+/// [`combine`] for scalars: compiled once for the stages and the end of the step.
 #[inline]
 fn combine_numbers<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>>(
     start: &ArrayX<M, R>,
@@ -326,7 +326,7 @@ impl<M: Ode, E: Lanes, R: Array<E>> ColumnKernel for JacobianRowProduct<'_, M, E
     }
 }
 
-/// A row of a [combination](combine).
+/// A row of [`combine`].
 struct RowCombination<'a, E, R, X> {
     start: &'a [E],
     h: E,
@@ -353,8 +353,8 @@ impl<E: Lanes, R: Array<E>, X: Array<R>> ColumnKernel for RowCombination<'_, E, 
     }
 }
 
-/// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an
-/// error, or doubted.
+/// Copies row-major `rows` to columns of a matrix of the result. A non-finite value is an error, or
+/// for SIMD lanes marks its lane.
 pub(super) fn copy_to_columns<E: Lanes, R: Array<E>>(
     rows: &[R],
     source: Range<usize>,

@@ -1,4 +1,4 @@
-//! How derivatives go along with the steps.
+//! Strategies of the forward sweep: all columns together, or in panels.
 
 use super::forward::{UnitDirections, Variation};
 use super::scheme::{Grid, Scheme};
@@ -7,10 +7,10 @@ use crate::error::{Error, Place};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 
-/// How derivatives in all directions go along with the steps.
+/// A forward sweep of the derivatives in all directions.
 pub(crate) trait ForwardSweep<M: Ode, E: Lanes, const S: usize> {
-    /// All steps, from `x` to `x`, with the derivatives; `evaluate_stage` sees each stage with its
-    /// `dξ_i`, if it is to see any.
+    /// Integrates over all steps with the derivatives; updates the state of the workspace. With
+    /// `has_stage_visitor` calls `on_stage` at each stage with its `dξ_i`.
     fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -22,7 +22,7 @@ pub(crate) trait ForwardSweep<M: Ode, E: Lanes, const S: usize> {
     ) -> Result<(), Error>;
 }
 
-/// All columns together.
+/// A sweep with all columns together.
 pub(crate) struct AllColumns;
 
 impl<M: Ode, E: Lanes, const S: usize> ForwardSweep<M, E, S> for AllColumns {

@@ -1,5 +1,5 @@
-//! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from
-//! the forward sweep and `μ_i` from the adjoint.
+//! Second-order sensitivities, `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with
+//! `D_i = d(ξ_i, u, p)/dw` from the forward sweep and `μ_i` from the adjoint.
 
 use super::scheme::{Scheme, entry_directions, is_zero};
 use super::step::{StagePoint, UnitStride, add};
@@ -12,27 +12,27 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 use core::ops::Range;
 
-/// The Hessian that the stages are added to.
+/// The sum of the Hessians of the stages.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct HessianSum<M: Ode, E: Lanes> {
     /// `∇²(μᵀ f)`, lower triangle.
     entries: M::Hessian<[E; 1]>,
-    /// `∇²(μᵀ f) D`, of the rows that are not zero.
+    /// Nonzero rows of `∇²(μᵀ f) D`.
     product: ArrayW<M, ArrayW<M, E>>,
     /// The sum over the stages, upper triangle.
     pub sum: ArrayW<M, ArrayW<M, E>>,
 }
 
 impl<M: Ode, E: Lanes> HessianSum<M, E> {
-    /// No stages yet.
+    /// Sets the sum to zero.
     pub fn reset(&mut self) {
         for row in self.sum.as_mut() {
             row.as_mut().fill(E::zeroed());
         }
     }
 
-    /// Adds a matrix of which the lower triangle is there.
+    /// Adds a symmetric matrix given by its lower triangle.
     pub fn add_lower(&mut self, lower: &[ArrayW<M, E>]) {
         for (i, row) in lower.iter().enumerate() {
             for (j, value) in row.as_ref().iter().enumerate().take(i + 1) {
@@ -44,7 +44,7 @@ impl<M: Ode, E: Lanes> HessianSum<M, E> {
         }
     }
 
-    /// Completes the lower triangle.
+    /// Copies the upper triangle to the lower.
     pub fn mirror(&mut self) {
         for i in 0..M::Shape::NW {
             for j in 0..i {
@@ -85,7 +85,7 @@ kernels! { by run_plain;
             row.as_mut().fill(E::zeroed());
         }
         if const { E::LANES > 1 } {
-            // Entries lie row by row.
+            // Entries are in row order.
             let (mut begin, end) = (0, entries.as_ref().len());
             while begin < end {
                 let row = M::STRUCTURE.hessian.at(begin).0;
@@ -141,7 +141,7 @@ kernels! { by run_plain;
     }
 }
 
-/// What the entries of a row add to a [product](multiply), as those of columns too.
+/// A row of the product in [`multiply`], including the transposed entries.
 struct SparseRowProduct<'a, M: Ode, E: Lanes> {
     row_entries: Range<usize>,
     entries: &'a M::Hessian<[E; 1]>,
@@ -165,7 +165,7 @@ impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
             else {
                 continue;
             };
-            // Variables u and p move only in their own directions.
+            // The rows of `u` and `p` in `D` are unit vectors.
             match direction_row(column) {
                 Some(d) => tiles::add::<A, E, W>(&mut sum, value, d, first),
                 None => tiles::add_to_column(&mut sum, value, first, column),
@@ -187,7 +187,7 @@ impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
     }
 }
 
-/// What states add to a row of the [sum](project).
+/// The contribution of states to a row of the sum in [`project`].
 struct CongruenceRow<'a, M: Ode, E: Lanes> {
     row: usize,
     product: &'a ArrayW<M, ArrayW<M, E>>,
@@ -211,8 +211,7 @@ impl<M: Ode, E: Lanes> ColumnKernel for CongruenceRow<'_, M, E> {
     }
 }
 
-/// Adds a row of `D` to one of the product: variables `u` and `p` move only in their own
-/// directions.
+/// Adds a row of `D` to a row of the product; the rows of `u` and `p` are unit vectors.
 #[inline(always)]
 fn add_row<A: Arithmetic, M: Ode, E: Lanes>(
     product: &mut ArrayW<M, ArrayW<M, E>>,

@@ -1,4 +1,4 @@
-//! An explicit integrator: how it is made, what is set, simulation. Its derivatives are in
+//! An explicit integrator: construction, settings, simulation. Its derivatives are in
 //! `sensitivities`.
 
 use super::engine::Engine;
@@ -47,7 +47,7 @@ pub struct Integrator<M: Ode, B, const S: usize, T: Real, W: Memory> {
 
 #[cfg(feature = "alloc")]
 impl<M: Ode, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T, Heap> {
-    /// An integrator with its memory on the heap.
+    /// Returns an integrator with its memory on the heap.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
@@ -59,7 +59,7 @@ impl<M: Ode, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T, Heap>
 
 #[cfg(feature = "alloc")]
 impl<M: Ode, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
-    /// An integrator for a tableau of the user's own, with its memory on the heap.
+    /// Returns an integrator for a user-defined tableau, with its memory on the heap.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]; [`Error::NotExplicit`] if the tableau is implicit.
@@ -73,7 +73,7 @@ impl<M: Ode, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: 
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator that is its own memory, for at most `STEPS` steps.
+    /// Returns an integrator that contains its memory, for at most `STEPS` steps.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
@@ -88,8 +88,8 @@ impl<M: Ode, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fall
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS`
-    /// steps.
+    /// Returns an integrator for a user-defined tableau that contains its memory, for at most
+    /// `STEPS` steps.
     ///
     /// # Errors
     /// As `with_tableau`.
@@ -98,8 +98,8 @@ where
     }
 }
 
-/// An integrator with the same options, parameters and time: its memory is its own, and empty until
-/// the first call. Parameters for which there is no memory are as if they had never been set.
+/// Copies options, parameters and time. The copy has its own memory, which is empty until its first
+/// call. Parameters that cannot be allocated are as if never set.
 #[cfg(feature = "alloc")]
 impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
     fn clone(&self) -> Self {
@@ -128,7 +128,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> core::fmt::Debug for Integra
 }
 
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
+    /// Size of the integrator in bytes. With [`Inline`] memory this is its total memory.
     pub const SIZE: usize = size_of::<Self>();
 
     pub(crate) fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
@@ -152,22 +152,22 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         })
     }
 
-    /// The options it was made with.
+    /// Returns the options.
     #[must_use]
     pub fn options(&self) -> &Options {
         &self.options
     }
 
-    /// What the last call did.
+    /// Returns the statistics of the last call.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
         self.engine.statistics()
     }
 
-    /// The parameters of all later calls.
+    /// Sets the parameters of all following calls.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]; the parameters are as before.
+    /// [`Error::NonFiniteInput`]; the last parameters remain valid.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         check_finite_input::<M, T>(p.as_slice(), Argument::P)?;
         let base = W::nominal(&mut self.engine.workspace)?;
@@ -177,26 +177,26 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The time at the start of the interval in all later calls; zero unless it was set.
+    /// Sets the time at the start of the interval for all following calls; the default is zero.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]; the time is as before.
+    /// [`Error::NonFiniteInput`]; the last time remains valid.
     pub fn set_time(&mut self, t0: T) -> Result<(), Error> {
         check_finite_input::<M, T>(&[t0], Argument::T)?;
         self.start_time = t0;
         Ok(())
     }
 
-    /// The state at the end of an interval of length `h`.
+    /// Returns the state at the end of an interval of length `h`.
     ///
     /// # Errors
-    /// Input or model values that are not finite, parameters that were never set, overflow, and in
-    /// the first call of a mode [`Error::OutOfMemory`].
+    /// Non-finite inputs or model values, parameters that were never set, overflow;
+    /// [`Error::OutOfMemory`] in the first call of a mode.
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         self.solve_with_quadrature(x0, u, h, None)
     }
 
-    /// Checks the input, and goes to the start of the interval.
+    /// Checks the inputs, and sets the state to the start of the interval.
     pub(super) fn begin_call(
         &mut self,
         x0: &VectorX<M, T>,
@@ -218,8 +218,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-/// [`check_model_input`](crate::finite::check_named), one number after the other: that is shorter where
-/// there are no registers, as on firmware.
+/// [`check_model_input`](crate::finite::check_model_input) with a loop over single numbers: shorter
+/// code on targets without SIMD registers, such as firmware.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]

@@ -1,4 +1,4 @@
-//! The calls that all integrators have in common, with an integrand or without.
+//! The trait of all integrators, with or without an integrand.
 
 use super::forward_sweep::AllColumns;
 use super::integrator::{Integrator, check_finite_input};
@@ -88,8 +88,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
 }
 
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those
-    /// of the solution; see [`quadrature`](crate::quadrature).
+    /// Adds a quadrature: computes the value and the derivatives of `∫ l(x, u, p, t) dt` together
+    /// with the solution; see [`quadrature`](crate::quadrature).
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,

@@ -5,8 +5,8 @@
 //! ξ_i = x_n + h Σ_{j<i} a_ij k_j      k_i = g(ξ_i, u, p, t_n + c_i h)      x_{n+1} = x_n + h Σ_i b_i k_i
 //! ```
 //!
-//! The derivatives of `g` are those of the residual `f = c (ẋ − g)`; see [`Ode`]. There is no dense
-//! output: an explicit method has no polynomial through its stages that keeps its order.
+//! The derivatives of `g` are those of the residual `f = c (ẋ − g)`; see [`Ode`]. Dense output is
+//! not available: the stages of an explicit method define no interpolation polynomial of its order.
 
 mod adjoint;
 mod engine;
@@ -25,12 +25,12 @@ mod step;
 mod tiles;
 
 pub use integrator::Integrator;
-// What steps of variable size are made of too, and batches.
+// Also used by adaptive integrators and batches.
 #[cfg(feature = "alloc")]
 pub(crate) use scheme::{Grid, Scheme};
 #[cfg(feature = "alloc")]
 pub(crate) use step::{StagePoint, StepRecord, UnitStride};
-// What computes a batch.
+// Used by batches.
 #[cfg(feature = "alloc")]
 pub(crate) use {
     engine::{Engine, MaskedResult},
@@ -64,7 +64,7 @@ use crate::tableau::{Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, He
     note = "explicit: `Euler`, `Midpoint`, `Heun`, `Rk4`, `DormandPrince5`, `Butcher6`, `DormandPrince8`, `Custom<S>`; implicit methods belong to `Irk`"
 )]
 pub trait Explicit: 'static {
-    /// The integrator with this method.
+    /// The integrator of this method.
     type Integrator<M: Ode, T: Real, W: Memory>;
 }
 
@@ -88,27 +88,27 @@ impl<const S: usize> Explicit for Custom<S> {
 /// ξ_i = x_n + h Σ_{j<i} a_ij k_j      k_i = g(ξ_i, u, p, t_n + c_i h)      x_{n+1} = x_n + h Σ_i b_i k_i
 /// ```
 ///
-/// It is an [`Integrator`], whose page has all that it can do:
+/// It is an [`Integrator`], with these functions:
 ///
 /// | | |
 /// | --- | --- |
-/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a tableau of one's own |
+/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a user-defined tableau |
 /// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time) | `p`, and `t` at the start of intervals |
 /// | [`solve`](Integrator::solve) | `x₊` |
 /// | [`forward`](Integrator::forward), [`directional`](Integrator::directional) | and derivatives by `(x₀, u, p)`: all of them, or in given directions |
 /// | [`adjoint`](Integrator::adjoint), [`adjoint_many`](Integrator::adjoint_many) | and gradients of `λᵀx₊` |
 /// | [`hessian`](Integrator::hessian), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients with second derivatives, or with first ones |
-/// | [`with`](Integrator::with) | integrals along the way |
-/// | [`statistics`](Integrator::statistics) | what the last call did |
+/// | [`with`](Integrator::with) | quadratures |
+/// | [`statistics`](Integrator::statistics) | statistics of the last call |
 ///
-/// Many intervals at once, side by side in registers: [`Batch`](crate::Batch).
+/// [`Batch`](crate::Batch) computes many intervals at once, in SIMD lanes.
 ///
-/// By default, one step in each interval: [`Options`](crate::Options), of which `newton` and
-/// `start` are not read. Units are those of the model; results have its dimensions.
+/// By default an interval is one step: [`Options`](crate::Options). Its fields `newton` and `start`
+/// have no effect. Units are those of the model; results have its dimensions.
 ///
 /// # Errors
-/// `Error::NonFiniteModel` where the model has no value, `Error::NonFiniteInput`,
-/// `Error::ParametersNotSet`, `Error::Overflow`, and `Error::OutOfMemory` of the first call of its
+/// `Error::NonFiniteModel` if the model has no value, `Error::NonFiniteInput`,
+/// `Error::ParametersNotSet`, `Error::Overflow`; `Error::OutOfMemory` in the first call of each
 /// kind.
 ///
 /// # Example

@@ -1,5 +1,5 @@
-//! Values that are not finite: among single numbers the first one is an error at once; of several
-//! side by side its lane is masked, and the others go on.
+//! Non-finite values: for scalars the first one is an error; for SIMD lanes it marks its lane, and
+//! the other lanes continue.
 
 use crate::error::Error;
 use crate::linalg::{are_finite, kernels, run_plain};
@@ -7,33 +7,32 @@ use crate::scalar::Lanes;
 use crate::scalar::lanes::REGISTERS;
 use bytemuck::Zeroable;
 
-/// Zero in every lane all of whose values were finite.
+/// Zero in every lane whose values were all finite, otherwise NaN.
 #[derive(Zeroable)]
 pub(crate) struct NonFiniteLanes<E>(E);
 
 impl<E: Lanes> NonFiniteLanes<E> {
-    /// Before a call.
+    /// Marks all lanes as finite.
     pub fn reset(&mut self) {
         self.0 = E::zeroed();
     }
 
-    /// The lanes all of whose values were finite.
+    /// Returns the lanes whose values were all finite.
     #[inline(always)]
     pub fn finite_lanes(&self) -> E::Mask {
         self.0.is_finite()
     }
 
-    /// Sets these lanes.
+    /// Sets the finite lanes.
     #[inline(always)]
     pub fn set_finite_lanes(&mut self, lanes: E::Mask) {
         self.0 = E::select(lanes, E::zeroed(), E::from_f64(f64::NAN));
     }
 
-    /// Looks at values. An error is made of the place and the value of the first that is not
-    /// finite.
+    /// Checks values; calls `error` with the index and the value of the first non-finite one.
     ///
     /// # Errors
-    /// That one, of single numbers.
+    /// That error, for scalars.
     #[inline(always)]
     pub fn check(&mut self, values: &[E], error: impl FnOnce(usize, f64) -> Error) -> Result<(), Error> {
         if const { E::LANES > 1 } {
@@ -55,12 +54,12 @@ impl<E: Lanes> NonFiniteLanes<E> {
     }
 }
 
-/// Whether single numbers are looked at one by one. Where registers take several of them all are,
-/// without a branch for each.
+/// Whether scalars are checked one by one. With SIMD registers all values are checked without
+/// branches.
 pub(super) const CHECK_EACH_VALUE: bool = !REGISTERS;
 
 kernels! { by run_plain;
-    /// Clears lanes with a non-finite value.
+    /// Unmarks lanes with a non-finite value.
     fn record [E: Lanes] [E] <A>(values: &'k [E], non_finite: &'k mut NonFiniteLanes<E>) {
         let mut finite = non_finite.finite_lanes();
         for value in values {

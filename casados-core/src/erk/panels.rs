@@ -1,8 +1,8 @@
-//! Derivatives of groups, a few columns at a time.
+//! Derivatives of groups of intervals, in panels of columns.
 //!
-//! Columns of a group are as many times longer as it has lanes, and those of all stages leave the
-//! nearest cache. So stages are linearised first, all those of a step; then a few columns go
-//! through all of them.
+//! Columns of SIMD registers are as many times longer as there are lanes, so that those of all
+//! stages exceed the L1 cache. Therefore all stages of a step are linearised first; then each panel
+//! is propagated through all of them.
 
 use super::forward::{Directions, UnitDirections, Variation, begin};
 use super::forward_sweep::ForwardSweep;
@@ -15,19 +15,19 @@ use crate::scalar::Lanes;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// So many columns have as many products under way as a processor can have.
+/// Number of columns of a panel: enough independent products to hide their latency.
 const PANEL_WIDTH: usize = 4;
 
-/// A few columns at a time.
+/// A forward sweep panel by panel.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct ColumnPanels<M: Ode, E: Lanes, const S: usize> {
-    /// Of each stage of a step.
+    /// The Jacobian of each stage of a step.
     jacobians: [M::Jacobian<[E; 1]>; S],
     panel: Variation<M, E, [E; PANEL_WIDTH], S>,
 }
 
-/// Some of the unit vectors.
+/// The unit vectors of a panel.
 #[derive(Clone, Copy)]
 struct PanelColumns {
     first: usize,
@@ -62,7 +62,7 @@ impl<M: Ode, E: Lanes, const S: usize> ForwardSweep<M, E, S> for ColumnPanels<M,
             M::jacobian_constants::<UnitStride<E>>(jacobian);
         }
         begin::<M, E, _, _>(E::from_f64(1.0), &mut variation.dx, UnitDirections);
-        // The `dξ_i` that are seen are in the places of `dk_i`.
+        // The `dξ_i` for `on_stage` are stored in `dk_i`.
         let Variation { dx, dk: seen, .. } = variation;
         for step in 0..grid.steps {
             let StepWorkspace { point, record, x, compensation: rest, .. } = &mut *workspace;
@@ -97,7 +97,7 @@ impl<M: Ode, E: Lanes, const S: usize> ForwardSweep<M, E, S> for ColumnPanels<M,
 }
 
 kernels! { by run_plain;
-    /// Some columns.
+    /// Copies the columns of a panel from the matrix.
     fn take [M: Ode, E: Lanes] [M, E] <A>(
         rows: &'k ArrayX<M, ArrayW<M, E>>,
         part: PanelColumns,
@@ -112,7 +112,7 @@ kernels! { by run_plain;
         }
     }
 
-    /// Some columns, back to where they belong.
+    /// Copies the columns of a panel back to the matrix.
     fn put [M: Ode, E: Lanes] [M, E] <A>(
         panel: &'k ArrayX<M, [E; PANEL_WIDTH]>,
         part: PanelColumns,

@@ -1,4 +1,4 @@
-//! What is the same in every call: the method, and the form of the model.
+//! The constants of all calls: the method and the equations of the model.
 
 use crate::model::{ArrayK, ArrayW, Ode};
 use crate::scalar::{Lanes, Scalar};
@@ -6,22 +6,22 @@ use crate::shape::{Array, Shape};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
-/// Which state an equation determines: `ẋ_state = factor · f` where `f` is its residual at `ẋ = 0`.
+/// The state that an equation determines: `ẋ_state = factor · f`, with the residual `f` at `ẋ = 0`.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 pub(crate) struct StateEquation<T> {
     pub state: usize,
     pub factor: T,
 }
 
-/// What is the same in every call: the method in the number type, and the form of the model.
+/// The constants of all calls: the method in the number type, and the equations of the model.
 pub(crate) struct Scheme<M: Ode, E: Lanes, const S: usize> {
     pub a: [[E; S]; S],
     pub b: [E; S],
     pub c: [E; S],
-    /// Of each equation.
+    /// The state of each equation.
     pub equations: ArrayK<M, StateEquation<E>>,
-    /// Of each direction `w`: whether the model has a second derivative with respect to its
-    /// variable.
+    /// Whether the model has a second derivative with respect to the variable of each element of
+    /// `w`.
     pub is_nonlinear: ArrayW<M, bool>,
 }
 
@@ -60,18 +60,18 @@ impl<M: Ode, E: Lanes, const S: usize> Scheme<M, E, S> {
     }
 }
 
-/// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the
-/// variables and the directions. `None` for an entry of `ẋ`, which occurs linearly.
+/// Returns the elements of `w` of an entry of the Hessian: `x`, `u`, `p` have the same order among
+/// the variables and in `w`. `None` for an entry of `ẋ`, which occurs linearly.
 pub(super) fn entry_directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
     let (row, column) = M::STRUCTURE.hessian.at(entry);
     Some((row.checked_sub(M::Shape::NX)?, column.checked_sub(M::Shape::NX)?))
 }
 
-/// Equal steps from `start`.
+/// Equal steps from `start_time` on.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<E> {
     pub start_time: E,
-    /// Of one step.
+    /// Step size.
     pub h: E,
     pub steps: usize,
     /// Whether sums over the steps are compensated.

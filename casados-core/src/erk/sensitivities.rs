@@ -1,4 +1,4 @@
-//! Derivatives of a call, as users see them: each answers one question, with nothing else computed.
+//! The public interface to derivatives.
 
 use super::adjoint::{AdjointProblem, AdjointSweep};
 use super::engine::write_state;
@@ -21,7 +21,7 @@ use bytemuck::Zeroable;
 use core::ops::Range;
 
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// The state at the end and its derivatives with respect to `x₀`, `u` and `p`.
+    /// Returns the final state and its derivatives with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// As [`Integrator::solve`].
@@ -32,8 +32,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.forward_with_quadrature(x0, u, h, None)
     }
 
-    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
-    /// for each direction.
+    /// Returns the derivatives of `Σ_i weight_i k_i` of the last step after
+    /// [`Integrator::forward`], one row per direction.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -58,7 +58,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The state at the end and its derivatives in the directions of `C` seeds.
+    /// Returns the final state and its derivatives in the directions of `C` seeds.
     ///
     /// # Errors
     /// As [`Integrator::solve`].
@@ -79,7 +79,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let workspace = W::nominal(&mut self.engine.workspace)?;
         let variation = &mut W::forward(&mut self.engine.forward)?.sweep.forward;
         let mut result = Directional::zeroed();
-        // As many columns at once as the memory of `forward` holds.
+        // The memory of `forward` limits the number of columns per sweep.
         let max_columns = M::Shape::NW.max(1);
         let start = workspace.x;
         for first in (0..C.max(1)).step_by(max_columns) {
@@ -104,7 +104,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(result)
     }
 
-    /// The state at the end and the gradient of `λᵀx`.
+    /// Returns the final state and the gradient of `λᵀx₊`.
     ///
     /// # Errors
     /// As [`Integrator::solve`].
@@ -118,7 +118,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.solve_adjoint(x0, u, h, lambda, None)
     }
 
-    /// The same, with an integrand or without.
+    /// [`Integrator::adjoint`] with an optional integrand.
     pub(super) fn solve_adjoint(
         &mut self,
         x0: &VectorX<M, T>,
@@ -132,7 +132,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(self.engine.adjoint(&grid, lambda.as_slice(), &mut integrand)?.1)
     }
 
-    /// The state at the end and the gradients of `λᵀx` for `C` seeds `λ`, the columns of `lambdas`.
+    /// Returns the final state and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of
+    /// `lambdas`.
     ///
     /// # Errors
     /// As [`Integrator::solve`].
@@ -155,7 +156,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let outcome = workspace.record_steps(&self.engine.scheme, &grid, records, &mut NoIntegrand);
         self.engine.counts = workspace.point.counts;
         outcome?;
-        // As many seeds at once as the memory holds: one row of directions.
+        // A row of directions in memory limits the number of seeds per sweep.
         let max_columns = M::Shape::NW.max(1);
         for first in (0..C).step_by(max_columns) {
             let columns = max_columns.min(C - first);
@@ -171,7 +172,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(result)
     }
 
-    /// The state at the end, its derivatives, and the gradient of `λᵀx`.
+    /// Returns the final state, its derivatives, and the gradient of `λᵀx₊`.
     ///
     /// # Errors
     /// As [`Integrator::solve`].
@@ -190,7 +191,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(self.engine.forward_adjoint(&grid, lambda.as_slice(), &mut AllColumns)?.1)
     }
 
-    /// The state at the end, its derivatives, and the gradient and Hessian of `λᵀx`.
+    /// Returns the final state, its derivatives, and the gradient and Hessian of `λᵀx₊`.
     ///
     /// # Errors
     /// As [`Integrator::solve`].

@@ -6,15 +6,15 @@ use crate::quadrature::OptionalIntegrand;
 use crate::scalar::{Lanes, Real};
 use crate::shape::Shape;
 
-/// What is beside the states at the stages: an integrand, if there is one.
+/// An optional integrand, evaluated at the stages.
 pub(crate) trait StageIntegrand<M: Ode, E: Lanes> {
-    /// Whether there is one.
+    /// Whether there is an integrand.
     fn is_present(&self) -> bool;
-    /// Before the first step.
+    /// Resets the sums before the first step.
     fn reset(&mut self);
-    /// Adds the value at a stage with these variables, times `h b`.
+    /// Adds the value at a stage with variables `v`, times `h b`.
     fn add_value(&mut self, v: &[E], weight: [E; 2], at: Place) -> Result<(), Error>;
-    /// Adds what a stage adds to the value and its derivatives, with `dξ`.
+    /// Adds the value and its derivatives at a stage, with `dξ`.
     fn add_forward(
         &mut self,
         v: &[E],
@@ -31,9 +31,9 @@ pub(crate) trait StageIntegrand<M: Ode, E: Lanes> {
         gradient: &mut ArrayV<M, [E; 1]>,
         at: Place,
     ) -> Result<(), Error>;
-    /// The lower triangle of its second derivatives, if there is one.
+    /// The lower triangle of the second derivatives of the integral; `None` without an integrand.
     fn hessian_sum(&self) -> Option<&[ArrayW<M, E>]>;
-    /// After the last step.
+    /// Completes the integral after the last step.
     fn finish(&mut self) -> Result<(), Error>;
 }
 
@@ -107,14 +107,14 @@ impl<M: Ode, T: Real> StageIntegrand<M, T> for OptionalIntegrand<'_, '_, M, T> {
     }
 }
 
-/// The variables to where an integrand takes them from.
+/// Copies the variables to the input of an integrand.
 fn copy_variables<T: Real>(variables: &[T], to: &mut [T]) {
     for (to, from) in to.iter_mut().zip(variables) {
         *to = *from;
     }
 }
 
-/// Nothing at all.
+/// The absence of an integrand.
 pub(crate) struct NoIntegrand;
 
 impl<M: Ode, E: Lanes> StageIntegrand<M, E> for NoIntegrand {

@@ -1,4 +1,4 @@
-//! One step of an explicit method: the stages one after the other, and the end.
+//! One step of an explicit method: its stages, and its end.
 
 use super::non_finite::{CHECK_EACH_VALUE, NonFiniteLanes};
 use super::scheme::{Grid, Scheme, is_zero};
@@ -11,10 +11,10 @@ use crate::scalar::{Lanes, Strided};
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// A number, or a register of several, as it lies in the arrays of the model.
+/// A number or a SIMD register in the arrays of the model, with stride one.
 pub(crate) type UnitStride<E> = Strided<E, 1>;
 
-/// One step: its start and the derivatives at its stages.
+/// One step: its initial state and the derivatives at its stages.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct StepRecord<M: Ode, E: Lanes, const S: usize> {
@@ -22,7 +22,7 @@ pub(crate) struct StepRecord<M: Ode, E: Lanes, const S: usize> {
     pub k: [ArrayX<M, E>; S],
 }
 
-/// Variables and residual of the model at one stage. `ẋ` is zero, always.
+/// Variables and residual of the model at one stage. `ẋ` is always zero.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct StagePoint<M: Ode, E: Lanes> {
@@ -32,7 +32,7 @@ pub(crate) struct StagePoint<M: Ode, E: Lanes> {
     pub counts: EvaluationCounts,
 }
 
-/// What the last call did.
+/// Numbers of steps and evaluations of the last call.
 #[derive(Clone, Copy, Default, Zeroable)]
 pub(crate) struct EvaluationCounts {
     pub steps: usize,
@@ -51,7 +51,7 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         self.v.as_mut().as_flattened_mut()
     }
 
-    /// Goes to stage `i`: `ξ_i = x_n + h Σ_{j<i} a_ij k_j` at `t_n + c_i h`.
+    /// Moves to stage `i`: `ξ_i = x_n + h Σ_{j<i} a_ij k_j` at `t_n + c_i h`.
     pub fn move_to_stage<const S: usize>(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -70,7 +70,7 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         self.non_finite.check(state.as_flattened(), |index, _| error(index))
     }
 
-    /// `k = g` at this point.
+    /// Evaluates `k = g` at this point.
     pub fn derivative<const S: usize>(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -84,7 +84,7 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         Ok(())
     }
 
-    /// `k = g` at this point, and the Jacobian of the residual.
+    /// Evaluates `k = g` at this point, and the Jacobian of the residual.
     pub fn derivative_jacobian<const S: usize>(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -97,12 +97,12 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         Ok(())
     }
 
-    /// The residual and its Jacobian at this point.
+    /// Evaluates the residual and its Jacobian at this point.
     pub fn jacobian(&mut self, jacobian: &mut M::Jacobian<[E; 1]>, at: Place) -> Result<(), Error> {
         self.counts.jacobians += 1;
         M::residual_jacobian::<UnitStride<E>>(&self.v, &mut self.f, jacobian);
         self.check_residual(at)?;
-        // Those by `ẋ`, which come first, are constants of an explicit model.
+        // The entries of `ẋ`, which come first, are constants in an explicit model.
         let first = M::STRUCTURE.blocks[1];
         let entries = jacobian.as_ref().as_flattened().get(first..).unwrap_or_default();
         self.check(entries, Quantity::Jacobian, at, |entry| M::STRUCTURE.jacobian.at(first + entry).0)
@@ -113,7 +113,7 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         check(non_finite, f.as_ref().as_flattened(), Quantity::Residual, at, |equation| equation)
     }
 
-    /// A value of the model that is not finite is an error, or doubted.
+    /// Checks values of the model: a non-finite one is an error, or for SIMD lanes marks its lane.
     pub fn check(
         &mut self,
         values: &[E],
@@ -141,8 +141,8 @@ fn check<E: Lanes>(
 }
 
 kernels! { by run_plain;
-    /// The state of a stage and its time. The first state that is not finite, where they are looked
-    /// at one by one.
+    /// Writes the state and the time of a stage. Returns the first non-finite state, if scalars are
+    /// checked one by one.
     fn place [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         grid: &'k Grid<E>,
@@ -171,7 +171,7 @@ kernels! { by run_plain;
         None
     }
 
-    /// What the equations say of the derivatives.
+    /// Computes the derivatives from the residuals.
     fn assign [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         f: &'k ArrayK<M, [E; 1]>,
@@ -202,7 +202,8 @@ kernels! { by run_plain;
 }
 
 kernels! { by dispatch;
-    /// `end + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+    /// `end + rest ← x + rest + h Σ_i b_i k_i`, with the compensation `rest` below the last digit
+    /// of `x`.
     fn advance_compensated [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         h: &'k E,
@@ -220,7 +221,7 @@ kernels! { by dispatch;
 }
 
 impl<M: Ode, E: Lanes, const S: usize> StepRecord<M, E, S> {
-    /// All stages of the step.
+    /// Computes all stages of the step.
     pub fn stages(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -238,8 +239,7 @@ impl<M: Ode, E: Lanes, const S: usize> StepRecord<M, E, S> {
         Ok(())
     }
 
-    /// `x_{n+1} = x_n + h Σ_i b_i k_i`; `rest` is what was rounded off from `x_n`, if sums are
-    /// compensated.
+    /// `x_{n+1} = x_n + h Σ_i b_i k_i`, with an optional compensation of `x_n`.
     pub fn advance(
         &self,
         scheme: &Scheme<M, E, S>,
@@ -262,21 +262,21 @@ impl<M: Ode, E: Lanes, const S: usize> StepRecord<M, E, S> {
     }
 }
 
-/// What every call needs.
+/// The workspace of all calls.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct StepWorkspace<M: Ode, E: Lanes, const S: usize> {
     pub point: StagePoint<M, E>,
     pub record: StepRecord<M, E, S>,
-    /// The state at the end of the step.
+    /// State at the end of the step.
     pub x: ArrayX<M, E>,
-    /// What was rounded off from it, if sums are compensated.
+    /// Compensation of `x`, if sums are compensated.
     pub compensation: ArrayX<M, E>,
     pub result: Nominal<M, E>,
 }
 
 impl<M: Ode, E: Lanes, const S: usize> StepWorkspace<M, E, S> {
-    /// All steps, from `x` to `x`, with an integrand or without.
+    /// Integrates over all steps; updates `x`.
     pub fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -294,7 +294,7 @@ impl<M: Ode, E: Lanes, const S: usize> StepWorkspace<M, E, S> {
         Ok(())
     }
 
-    /// All steps, from `x` to `x`, each of them kept; with an integrand or without.
+    /// Integrates over all steps and records each of them; updates `x`.
     pub fn record_steps(
         &mut self,
         scheme: &Scheme<M, E, S>,

@@ -1,19 +1,20 @@
-//! Sums of rows whose columns stay in registers while they are added up.
+//! Sums of rows, in micro-tiles of columns that stay in registers during the summation.
 //!
-//! A register of several numbers is written to memory in as much time as several products take. So
-//! of groups a few columns are summed up at a time, over all terms of a row. Single numbers go
-//! through whole rows, term by term: the compiler makes registers of their columns.
+//! Storing a SIMD register takes as long as several products. For groups of intervals a micro-tile
+//! is therefore summed over all terms of a row. For scalars whole rows are summed term by term: the
+//! compiler vectorises over their columns.
 
 use crate::linalg::Arithmetic;
 use crate::scalar::Lanes;
 
-/// What is done with `W` columns at a time. To be `#[inline(always)]`.
+/// An operation on `W` columns at a time; `#[inline(always)]`.
 pub(super) trait ColumnKernel {
     fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize);
 }
 
-/// All columns from `first` on, eight or four at most at a time: as many have a register each for
-/// their sums, and as many products under way as the processor can have.
+/// Processes all columns from `first` on, in micro-tiles of at most eight or four columns: each
+/// column has a register for its sum, and there are enough independent products to hide their
+/// latency.
 #[inline(always)]
 pub(super) fn for_each_tile<A: Arithmetic, V: ColumnKernel, const MAX_WIDTH: usize>(
     mut first: usize,
@@ -37,7 +38,7 @@ pub(super) fn for_each_tile<A: Arithmetic, V: ColumnKernel, const MAX_WIDTH: usi
     }
 }
 
-/// Columns of a row.
+/// Loads columns of a row.
 #[inline(always)]
 pub(super) fn load<E: Lanes, const W: usize>(row: &[E], first: usize) -> [E; W] {
     let mut tile = [E::zeroed(); W];
@@ -47,7 +48,7 @@ pub(super) fn load<E: Lanes, const W: usize>(row: &[E], first: usize) -> [E; W] 
     tile
 }
 
-/// Columns to a row.
+/// Stores columns of a row.
 #[inline(always)]
 pub(super) fn store<E: Lanes, const W: usize>(tile: &[E; W], row: &mut [E], first: usize) {
     if let Some(row) = row.get_mut(first..first + W) {
@@ -65,8 +66,8 @@ pub(super) fn add<A: Arithmetic, E: Lanes, const W: usize>(sum: &mut [E; W], a: 
     }
 }
 
-/// `a` more in one column, if it is among these. Each is looked at: a place that is found out when
-/// it runs would keep sums out of registers.
+/// Adds `a` to `column` if it is in this micro-tile. All columns are compared: an index at run time
+/// would move the sums out of registers.
 #[inline(always)]
 pub(super) fn add_to_column<E: Lanes, const W: usize>(sum: &mut [E; W], a: E, first: usize, column: usize) {
     for (i, sum) in sum.iter_mut().enumerate() {

@@ -1,9 +1,9 @@
-//! What errors say.
+//! Messages of errors.
 
 use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
-/// How other start values are given.
+/// A hint how to set the initial guess.
 const START_VALUE_HINT: &str = "set a start value near the solution by `nominal(z = ..)` in the attribute of the model, or by `set_start`";
 
 impl fmt::Display for Argument {
@@ -26,7 +26,7 @@ impl fmt::Display for Argument {
 }
 
 impl Quantity {
-    /// What is not finite, and its value.
+    /// Writes the quantity that is not finite, and its value.
     fn fmt_value(self, f: &mut fmt::Formatter<'_>, equation: usize, value: f64) -> fmt::Result {
         match self {
             Quantity::Residual => write!(f, "equation {equation} of the model is {value}"),

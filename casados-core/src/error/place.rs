@@ -1,6 +1,6 @@
-//! Where an error arose: the step, the argument, the function of the model.
+//! The place of an error: the step, the argument, the quantity of the model.
 
-/// Where in a run: all counted from zero.
+/// The place of an error in a run; all indices start from zero.
 ///
 /// ```
 /// # use casados::error::{Place, Quantity};
@@ -20,11 +20,11 @@
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The step of the interval.
+    /// The index of the step in the interval.
     pub step: usize,
-    /// The stage of the step.
+    /// The index of the stage in the step.
     pub stage: usize,
-    /// The iteration of Newton's method; of an explicit method zero.
+    /// The iteration of Newton's method; zero for explicit methods.
     pub iteration: usize,
 }
 
@@ -67,13 +67,13 @@ pub enum Argument {
     SeedU,
     /// The forward seed of `p`.
     SeedP,
-    /// The start value of `ẋ` for Newton's method.
+    /// The initial guess of `ẋ` for Newton's method.
     StartXdot,
-    /// The start value of `z` for Newton's method.
+    /// The initial guess of `z` for Newton's method.
     StartZ,
 }
 
-/// What a model was asked for.
+/// A quantity of a model.
 ///
 /// ```
 /// # use casados::error::{Place, Quantity};
@@ -91,12 +91,12 @@ pub enum Argument {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quantity {
-    /// `f`
+    /// The residual `f`.
     Residual,
     /// An entry of `∂f/∂(ẋ, x, z, u, p)`.
     Jacobian,
-    /// An entry of `∇(μᵀ f)`; its place is a variable, not an equation.
+    /// An entry of `∇(μᵀ f)`; its index is a variable, not an equation.
     Adjoint,
-    /// An entry of `∇²(μᵀ f)`; its place is a variable, not an equation.
+    /// An entry of `∇²(μᵀ f)`; its index is a variable, not an equation.
     Hessian,
 }

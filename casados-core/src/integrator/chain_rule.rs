@@ -1,5 +1,5 @@
-//! The chain rule over parts of an interval: derivatives of parts as one matrix, and those of the
-//! whole.
+//! The chain rule over the parts of an interval: derivatives of each part as one matrix, and
+//! derivatives of the whole interval.
 //!
 //! With `V = dx/dw` at the start of a part, its derivatives `(A, B)` by `x` and by `(u, p)`, and
 //! `D = (V, (0, 1))`:
@@ -14,19 +14,19 @@ use crate::result::{self, Forward, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, entry};
 
-/// `dx/dw`, row by row.
+/// `dx/dw` in row-major order.
 pub(crate) type StateSensitivities<M, T> = ArrayX<M, ArrayW<M, T>>;
-/// A symmetric matrix in full, row by row.
+/// A full symmetric matrix in row-major order.
 pub(crate) type FullHessian<M, T> = ArrayW<M, ArrayW<M, T>>;
 
-/// `dx/dw` where `x` is `x₀`.
+/// Sets `dx/dw` for `x = x₀`.
 pub(crate) fn set_identity<M: Dae, T: Real>(v: &mut StateSensitivities<M, T>) {
     for (x, row) in v.as_mut().iter_mut().enumerate() {
         *row = ArrayW::<M, T>::from_fn(|w| if w == x { T::ONE } else { T::ZERO });
     }
 }
 
-/// A row of `(A, B_u, B_p)` times `D`.
+/// Multiplies a row of `(A, B_u, B_p)` by `D`.
 fn chain_row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
     index: usize,
     v: &StateSensitivities<M, T>,
@@ -44,7 +44,7 @@ fn chain_row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
     sum
 }
 
-/// `V⁺`
+/// Computes `V⁺`.
 pub(crate) fn chain_states<M: Dae, T: Real>(
     part: &Forward<M, T>,
     current: &StateSensitivities<M, T>,
@@ -55,14 +55,14 @@ pub(crate) fn chain_states<M: Dae, T: Real>(
     }
 }
 
-/// The derivatives of the states at the end, from `V` there.
+/// Writes the derivatives of the final states, from `V` at the end.
 pub(crate) fn write_states<M: Dae, T: Real>(v: &StateSensitivities<M, T>, result: &mut Forward<M, T>) {
     for (index, row) in v.as_ref().iter().enumerate() {
         result::write_row(row.as_ref(), index, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
     }
 }
 
-/// Those of the algebraic states at the end of the last part, which starts with `v`.
+/// Writes the derivatives of the final algebraic states; `v` is `V` at the start of the last part.
 pub(crate) fn write_algebraic<M: Dae, T: Real>(
     part: &Forward<M, T>,
     v: &StateSensitivities<M, T>,
@@ -74,7 +74,7 @@ pub(crate) fn write_algebraic<M: Dae, T: Real>(
     }
 }
 
-/// `S += Dᵀ H D` with the Hessian of a part and the rows of `V`, one after the other.
+/// `S += Dᵀ H D` with the Hessian of a part and the rows of `V`.
 pub(crate) fn add_congruence<M: Dae, T: Real>(
     h: impl Fn(usize, usize) -> T,
     v: &[T],
@@ -100,7 +100,7 @@ pub(crate) fn add_congruence<M: Dae, T: Real>(
     }
 }
 
-/// An element of the whole Hessian.
+/// Returns an element of the full Hessian.
 pub(crate) fn hessian_element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize) -> T {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let (i, j) = (r.min(c), r.max(c));
@@ -117,8 +117,8 @@ pub(crate) fn hessian_element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c
     }
 }
 
-/// The blocks of a sum, to the last bit symmetric: of two elements that differ by rounding the
-/// lower one.
+/// Writes the blocks of a sum, bitwise symmetric: of two elements that differ by rounding the lower
+/// one is used.
 pub(crate) fn write_blocks<M: Dae, T: Real>(sum: &FullHessian<M, T>, result: &mut Hessian<M, T>) {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let at = |r: usize, c: usize| if r >= c { sum[r][c] } else { sum[c][r] };

@@ -1,4 +1,4 @@
-//! What integrators have in common: the calls of one interval.
+//! The trait of all integrators of one interval.
 
 pub(crate) mod chain_rule;
 mod divided;
@@ -15,18 +15,17 @@ use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::statistics::Statistics;
 
-/// `x` of the model of an integrator.
+/// The state of the model of an integrator.
 type StateOf<I> = VectorX<<I as Integrator>::Model, <I as Integrator>::Number>;
-/// `u` of the model of an integrator.
+/// The control of the model of an integrator.
 type ControlOf<I> = VectorU<<I as Integrator>::Model, <I as Integrator>::Number>;
 
-/// An integrator of one interval, whichever it is: [`Irk`](crate::Irk), [`Erk`](crate::Erk) or
-/// `Adaptive`.
+/// An integrator of one interval: [`Irk`](crate::Irk), [`Erk`](crate::Erk) or `Adaptive`.
 ///
 /// Calls take the state at the start of the interval, the control, and the length of the interval,
-/// and return a reference to results in the memory of the integrator. What each of them does and
-/// which errors it has is said at the integrators, which have the same calls without the trait;
-/// those with derivatives exist where the memory of the integrator has a place for them.
+/// and return a reference to results in the memory of the integrator. The integrators have the same
+/// functions without the trait, with documentation of their results and errors; functions with
+/// derivatives exist if the memory of the integrator supports them.
 ///
 /// ```
 /// # use casados_core::{Dae, Error, Heap, Integrator, model::{VectorU, VectorX}};
@@ -43,29 +42,30 @@ type ControlOf<I> = VectorU<<I as Integrator>::Model, <I as Integrator>::Number>
 /// }
 /// ```
 pub trait Integrator {
-    /// The model that is integrated.
+    /// The model.
     type Model: Dae;
-    /// What it is computed with.
+    /// The number type.
     type Number: Real;
-    /// Where results are.
+    /// The memory of the integrator.
     type Memory: Memory;
 
-    /// Parameters of all later calls.
+    /// Sets the parameters of all following calls.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last parameters stay.
+    /// [`Error::NonFiniteInput`]; the last parameters remain valid.
     fn set_parameters(&mut self, p: &VectorP<Self::Model, Self::Number>) -> Result<(), Error>;
-    /// The time at the start of the interval of all later calls; zero if never set.
+    /// Sets the time at the start of the interval for all following calls; the default is zero.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last time stays.
+    /// [`Error::NonFiniteInput`]; the last time remains valid.
     fn set_time(&mut self, t: Self::Number) -> Result<(), Error>;
-    /// Forgets the warm start, of an integrator that has one.
+    /// Discards the warm start, if the integrator has one.
     fn reset(&mut self);
-    /// What the last call did; of an adaptive integrator what it did to choose its steps.
+    /// Returns the statistics of the last call; for an adaptive integrator those of the step
+    /// selection.
     fn statistics(&self) -> Statistics;
 
-    /// As [`solve`](Self::solve), with an integrand or without.
+    /// [`solve`](Self::solve) with an optional integrand.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -76,7 +76,7 @@ pub trait Integrator {
         h: Self::Number,
         integrand: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error>;
-    /// As [`forward`](Self::forward), with an integrand or without.
+    /// [`forward`](Self::forward) with an optional integrand.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -89,7 +89,7 @@ pub trait Integrator {
     ) -> Result<&Forward<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithForward;
-    /// As [`adjoint`](Self::adjoint), with an integrand or without.
+    /// [`adjoint`](Self::adjoint) with an optional integrand.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -103,7 +103,7 @@ pub trait Integrator {
     ) -> Result<&Adjoint<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithAdjoint<1>;
-    /// As [`hessian`](Self::hessian), with an integrand or without.
+    /// [`hessian`](Self::hessian) with an optional integrand.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -118,7 +118,7 @@ pub trait Integrator {
     where
         Self::Memory: WithHessian;
 
-    /// The solution at the end of an interval of length `h`.
+    /// Returns the solution at the end of an interval of length `h`.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -130,7 +130,7 @@ pub trait Integrator {
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error> {
         self.solve_with_quadrature(x0, u, h, None)
     }
-    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`.
+    /// Returns the solution, and its derivatives with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -145,7 +145,7 @@ pub trait Integrator {
     {
         self.forward_with_quadrature(x0, u, h, None)
     }
-    /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`.
+    /// Returns the solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -161,7 +161,7 @@ pub trait Integrator {
     {
         self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    /// Returns the solution, its derivatives, and the gradient and the Hessian of `λᵀx`.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -177,8 +177,8 @@ pub trait Integrator {
     {
         self.hessian_with_quadrature(x0, u, h, lambda, None)
     }
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
-    /// those of the solution; see [`quadrature`](crate::quadrature).
+    /// Adds a quadrature: computes the value and the derivatives of `∫ l(x, z, u, p, t) dt`
+    /// together with the solution; see [`quadrature`](crate::quadrature).
     fn with<'a, 'b, Q: Integrand<Self::Model, Self::Number> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,

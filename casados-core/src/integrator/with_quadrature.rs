@@ -6,8 +6,8 @@ use crate::memory::{WithAdjoint, WithForward, WithHessian};
 use crate::quadrature::Integrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 
-/// An integrator with an integrand: its calls are those of the integrator, and gradients and
-/// Hessians those of `λᵀx + νᵀq`; see [`Integrand`].
+/// An integrator with an integrand. Its functions are those of the integrator; gradients and
+/// Hessians are those of `λᵀx + νᵀq`; see [`Integrand`].
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -31,7 +31,7 @@ pub struct With<'a, 'b, I, Q: ?Sized> {
 }
 
 impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
-    /// See [`Integrator::solve`]; the integral.
+    /// [`Integrator::solve`] with the integral.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -44,7 +44,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
         self.integrator.solve_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
-    /// See [`Integrator::forward`]; the integral and its derivatives.
+    /// [`Integrator::forward`] with the integral and its derivatives.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -60,7 +60,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
         self.integrator.forward_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
-    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    /// [`Integrator::adjoint`]; the gradient is that of `λᵀx` plus the integral.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
@@ -77,7 +77,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
         self.integrator.adjoint_with_quadrature(x0, u, h, lambda, Some(self.integrand))
     }
 
-    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
+    /// [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` plus the integral.
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].

@@ -1,11 +1,11 @@
-//! Adjoint sensitivities: backwards over the steps.
+//! Adjoint sensitivities, computed backwards over the steps.
 //!
 //! ```text
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0)        λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i        λ_w −= Σ_i f_w,iᵀ μ_i
 //! ```
 //!
-//! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
-//! there is `ℓ_i(0) ν`.
+//! For the gradient of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand
+//! side of `z_i` in the first step is `ℓ_i(0) ν`.
 
 use super::driver::CallContext;
 use super::workspace::{Linearization, StageWorkspace, Step};
@@ -23,7 +23,7 @@ use crate::shape::{Aligned, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// The adjoint of `C` seeds while it goes backwards.
+/// The state of the backward sweep for `C` seeds.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct AdjointSweep<M: Dae, T: Plain, const S: usize, const C: usize> {
@@ -33,20 +33,21 @@ pub struct AdjointSweep<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) gradient: ArrayW<M, [T; C]>,
     /// `μ`, one row per slot and stage.
     pub(crate) mu: Aligned<ArrayK<M, [[T; C]; S]>>,
-    /// What an integrand, or weights of `z₀`, add to the right-hand side of the unknowns at the
-    /// stages,
+    /// Source terms of the stage unknowns, from an integrand or from `ν`: added to the right-hand
+    /// side.
     pub(crate) stage_source: ArrayK<M, [T; S]>,
-    /// and to `(λ_n, λ_w)`.
+    /// Source terms of `(λ_n, λ_w)`.
     pub(crate) end_source: ArrayW<M, T>,
-    /// Whether there is any of it.
+    /// Whether there are source terms.
     pub(crate) has_source: bool,
-    /// The weights `ν` of `z₀`, and whether there are any.
+    /// The weights `ν` of `z₀`; valid if `has_nu`.
     nu: VectorZ<M, T>,
     has_nu: bool,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> {
-    /// `λ_N`: seeds in column-major order; and the weights of `z₀`, or none.
+    /// Sets `λ_N` to the seeds, in column-major order, and `ν` to the weights of `z₀`; `nu` may be
+    /// empty.
     pub(crate) fn set_seeds(&mut self, seeds: &[E], nu: &[E]) {
         let nx = M::Shape::NX;
         for (state, row) in self.lambda.as_mut().iter_mut().enumerate() {
@@ -61,8 +62,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
         }
     }
 
-    /// What weights of `z₀` add to the right-hand side, in the first step, after what an integrand
-    /// does.
+    /// Adds the source term `ℓ_i(0) ν` of the first step, after those of an integrand.
     pub(crate) fn add_z0_weights(&mut self, coefficients: &Coefficients<E, S>) {
         if const { M::Shape::NZ == 0 } || !self.has_nu {
             return;
@@ -76,8 +76,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
         weigh(self.nu.as_slice(), &coefficients.lagrange_start, source);
     }
 
-    /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it
-    /// satisfies its equations.
+    /// Solves for `μ` of a linearised step, with the factors of `stored_linearization` or of the
+    /// workspace; returns the lanes in which `μ` satisfies its equations.
     pub(crate) fn solve_and_verify<F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -88,7 +88,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
         work.verify_adjoint(stored_linearization, self, coefficients)
     }
 
-    /// `μ`
+    /// Solves `Jᵀ μ = h (b ⊗ λ_{n+1}, 0)` plus source terms.
     pub(crate) fn solve_multipliers<F: Fallback>(
         &mut self,
         linear: &Linearization<M, E, S, F>,
@@ -103,7 +103,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
         linear.solve_transposed((coefficients, h), mu);
     }
 
-    /// `λ_n` from `λ_{n+1}` and `μ`.
+    /// Updates `λ_{n+1}` to `λ_n`, and `λ_w`, from `μ`.
     pub(crate) fn advance<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>) {
         let Self { lambda, gradient, mu, end_source: shift, has_source: sourced, .. } = self;
         let (plan, mu) = (F::plan::<M>(), mu.as_ref());
@@ -119,8 +119,9 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
 }
 
 impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointSweep<M, T, S, C> {
-    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without. What was
-    /// `kept` of it is brought back where it does not do, and is `None` then.
+    /// Computes `λ_n` from `λ_{n+1}` over a linearised step, with an optional integrand. If the
+    /// stored factors are too inaccurate, copies the stored linearisation to the workspace,
+    /// factorises the whole matrix with pivoting, and sets `stored_linearization` to `None`.
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
@@ -154,7 +155,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointSweep<M, T, S, C> {
 }
 
 kernels! {
-    /// `h (b ⊗ λ, 0)`
+    /// `μ = h (b ⊗ λ, 0)`
     fn right_hand_side [E: Lanes, const S: usize, const C: usize] [E, S, C] <A>(
         lambda: &'k [[E; C]],
         b: &'k [E; S],
@@ -171,7 +172,7 @@ kernels! {
         }
     }
 
-    /// Adds the same to all seeds.
+    /// Adds the same source term to all seeds.
     fn add_to_all [E: Lanes, const C: usize] [E, C] <A>(to: &'k mut [[E; C]], from: &'k [E]) {
         for (to, &from) in to.iter_mut().zip(from) {
             for to in to {
@@ -208,7 +209,7 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        // Lengths that the optimiser knows need no looking at.
+        // Equal lengths, so that the optimiser removes bounds checks.
         let (nx, nk, nw) = (self.plan.nx(), self.plan.nk(), self.plan.nw());
         if self.mu.len() == nk && self.lambda.len() == nx && self.gradient.len() == nw {
             for_each_row::<A, _>(&mut self);
@@ -266,14 +267,14 @@ pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) backward: AdjointSweep<M, T, S, C>,
 }
 
-/// The memory of adjoints, of any number of seeds.
+/// The memory of adjoints of any number of seeds.
 pub struct Adjoints<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);
 impl<M: Dae, T: Real, const S: usize> Family for Adjoints<M, T, S> {
     type Of<const C: usize> = AdjointMemory<M, T, S, C>;
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
-    /// The result, after the first step.
+    /// Writes the result, after the sweep has reached the first step.
     pub(crate) fn write_result<F: Fallback>(&mut self, work: &StageWorkspace<M, E, S, F>) {
         let Self { result, backward } = self;
         result.nominal = work.result;

@@ -1,13 +1,13 @@
-//! Derivatives are tried on their own equations before they are trusted: nothing else would notice
-//! an elimination that lost digits.
+//! Backward errors of derivatives: they reveal an elimination that lost digits.
 //!
 //! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ`
-//! satisfy `Jᵀμ = h (b ⊗ λ, 0)`. A sum over all directions (with weights that are neither equal nor
-//! alternating, so that no structure hides an error) is held against the sizes of its terms,
-//! equation by equation: however equations and unknowns are scaled. What is solved for is `dk`, so
-//! that `dξ = V + h Σ a dk` counts with its own terms (W. Oettli, W. Prager, Compatibility of
-//! approximate solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where
-//! they cancel, no elimination is to blame.
+//! satisfy `Jᵀμ = h (b ⊗ λ, 0)`. The residual of a weighted sum over all directions is compared
+//! with the magnitudes of its terms, equation by equation, which is invariant under scaling of
+//! equations and unknowns. The weights are neither equal nor alternating, so that no structure of
+//! the model hides an error. The unknowns of the solve are `dk`, so the magnitude of
+//! `dξ = V + h Σ a dk` is the sum of those of its terms (W. Oettli, W. Prager, Compatibility of
+//! approximate solution of linear equations with given error bounds, Numer. Math. 6 (1964)):
+//! cancellation in this sum is no error of the elimination.
 
 use super::adjoint::AdjointSweep;
 use super::directions::{Directions, checksum_weight};
@@ -22,17 +22,18 @@ use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
 
-/// Derivatives are good if they satisfy their equations to this many ε of the terms.
+/// Bound of the backward error of derivatives, in ε.
 const BACKWARD_ERROR_TOLERANCE: f64 = 4096.0;
 
-/// A residual is zero below this many ε of its terms.
+/// Bound of the backward error of the residual, in ε.
 const RESIDUAL_TOLERANCE: f64 = 16.0;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
+    /// Returns the lanes in which the forward derivatives of a step satisfy the linearised
+    /// equations.
     ///
-    /// Where the directions happen to cancel in the sum, its rounding errors look large beside it.
-    /// They hardly do in a second sum too.
+    /// If the directions cancel in the weighted sum, its rounding errors are large relative to it.
+    /// A second sum with other weights is then checked, in which they hardly cancel too.
     pub(crate) fn verify_forward<R: Array<E>, D: Directions<E>>(
         &mut self,
         sweep: &ForwardSweep<M, E, R, S>,
@@ -41,7 +42,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         with_second_weights: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        // The residual has done its work.
+        // The residual is no longer needed: its memory is reused.
         let Self {
             variable_scratch: [probe, sizes],
             f,
@@ -68,8 +69,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         })
     }
 
-    /// Whether the adjoints of a step satisfy their equations, which may have been `kept`, lane by
-    /// lane, with `λ` at the end of the step.
+    /// Returns the lanes in which the adjoints of a step satisfy their equations, with `λ` at the
+    /// end of the step. The equations are those of `stored_linearization` or of the workspace.
     pub(crate) fn verify_adjoint<const C: usize>(
         &mut self,
         stored_linearization: Option<&Linearization<M, E, S, F>>,
@@ -93,8 +94,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Whether the residual is at the level of the rounding errors of its terms,
-    /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`, lane by lane.
+    /// Returns the lanes in which the residual is at the level of the rounding errors of its terms,
+    /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`.
     pub(crate) fn residual_is_rounding(&mut self) -> E::Mask {
         self.replicate_jacobian();
         dispatch(ResidualTest {
@@ -107,8 +108,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     }
 }
 
-/// Whether loops over so many entries become straight lines: in registers, of which each entry has
-/// several, they are a small part of a step, unless there are few.
+/// Whether loops over this many entries are unrolled. Loops on SIMD registers take a small part of
+/// a step, so only short ones are unrolled.
 const fn is_worth_unrolling<E>(entries: Option<usize>) -> bool {
     size_of::<E>() <= 8 || matches!(entries, Some(..65))
 }
@@ -154,7 +155,8 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for ResidualTest<'_, M, E, S>
         else {
             return;
         };
-        // In registers: the optimiser cannot know that nothing here overlaps.
+        // A local copy stays in registers: the optimiser cannot prove that the arguments do not
+        // overlap.
         let mut size = *sizes;
         for i in 0..S {
             size[i] = size[i] + (values[i] * points[i]).abs();
@@ -176,7 +178,7 @@ fn weighted_seed_sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
     sum
 }
 
-/// `|sum| ≤ ROUNDING ε size`
+/// `|sum| ≤ BACKWARD_ERROR_TOLERANCE ε size`
 #[inline(always)]
 fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
     E::le(sum.abs(), E::from_f64(BACKWARD_ERROR_TOLERANCE * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
@@ -192,7 +194,7 @@ fn magnitudes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
     sizes
 }
 
-/// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
+/// `start + h Σ_l a_il dk_l`, and the sum of the magnitudes of its terms.
 #[inline(always)]
 fn stage_sums_with_magnitudes<A: Arithmetic, E: Lanes, const S: usize>(
     start: E,
@@ -216,10 +218,10 @@ struct VerifyForward<'a, M: Plan, E: Plain, const S: usize> {
     a: &'a [[E; S]; S],
     h: E,
     jacobian: &'a M::Jacobian<[E; S]>,
-    /// The sum over the directions of every variable, and what it is rounded relative to.
+    /// Weighted sums over the directions of every variable, and their magnitudes.
     variable_sums: &'a mut [[E; S]],
     variable_magnitudes: &'a mut [[E; S]],
-    /// The same of every equation.
+    /// Sums of every equation, and their magnitudes.
     equation_sums: &'a mut M::K<[E; S]>,
     equation_magnitudes: &'a mut M::K<[E; S]>,
 }
@@ -242,7 +244,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             equation_magnitudes: terms,
         } = self;
         let (nx, zero) = (plan.nx(), E::from_f64(0.0));
-        // Lengths that the optimiser knows need no looking at.
+        // Equal lengths, so that the optimiser removes bounds checks.
         let (nk, nv) = (plan.nk(), plan.nv());
         let (jacobian, sums, terms) = (jacobian.as_ref(), sums.as_mut(), terms.as_mut());
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
@@ -291,7 +293,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     }
 }
 
-/// For each equation the sum over all variables, and that of the sizes of its terms.
+/// For each equation the sum over all variables, and the sum of the magnitudes of its terms.
 struct EquationSums<'a, M, E, const S: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
@@ -324,10 +326,11 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for EquationSums<'_, M, E, S>
         else {
             return;
         };
-        // In registers: the optimiser cannot know that nothing here overlaps.
+        // Local copies stay in registers: the optimiser cannot prove that the arguments do not
+        // overlap.
         let (mut sum, mut term) = (*sums, *terms);
         for i in 0..S {
-            // The sign of the sum is of no interest.
+            // The sum has the opposite sign; only its magnitude matters.
             sum[i] = A::subtract(sum[i], values[i], probe[i]);
             term[i] = A::subtract(term[i], -values[i].abs(), sizes[i]);
         }
@@ -339,7 +342,7 @@ struct VerifyAdjoint<'a, M: Plan, E: Plain, const S: usize, const C: usize> {
     plan: M,
     lambda: &'a [[E; C]],
     mu: &'a [[[E; C]; S]],
-    /// Right-hand sides of an integrand, the same for all seeds.
+    /// Source terms of an integrand, the same for all seeds.
     source: &'a [[E; S]],
     a: &'a [[E; S]; S],
     b: &'a [E; S],
@@ -349,7 +352,7 @@ struct VerifyAdjoint<'a, M: Plan, E: Plain, const S: usize, const C: usize> {
     magnitudes: &'a mut M::V<[E; S]>,
 }
 
-/// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sizes of the terms.
+/// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sum of the magnitudes of its terms.
 struct VariableSums<'a, M, E, const S: usize, const C: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
@@ -375,7 +378,8 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> RowVisitor for VariableS
         else {
             return;
         };
-        // In registers: the optimiser cannot know that nothing here overlaps.
+        // Local copies stay in registers: the optimiser cannot prove that the arguments do not
+        // overlap.
         let (mut total, mut size) = (*sums, *sizes);
         for i in 0..S {
             let term = values[i] * weighted_seed_sum(&mu[i]);
@@ -404,7 +408,7 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint
         let (sums, sizes) = (&*total.sums, &*total.magnitudes);
         let mut valid = E::le(zero, zero);
         for unknown in 0..nk {
-            // Of `k` what multiplies it at its own stage, and through `ξ` at all.
+            // For `k`: the entries of `f_ẋ` at its own stage, and those of `f_x` through all `ξ`.
             let variable = if unknown < nx { unknown } else { unknown + nx };
             let (Some(total), Some(size)) = (sums.get(variable), sizes.get(variable)) else { continue };
             let (mut total, mut size) = (*total, *size);

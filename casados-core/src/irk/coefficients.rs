@@ -1,4 +1,4 @@
-//! The coefficients of a tableau, and the sums over stages that they are made for.
+//! The coefficients of a tableau, and sums over stages.
 
 use crate::linalg::{Arithmetic, Eigenbasis};
 use crate::scalar::{Field, Lanes};
@@ -10,26 +10,26 @@ pub(crate) struct Coefficients<E, const S: usize> {
     pub a: [[E; S]; S],
     pub b: [E; S],
     pub c: [E; S],
-    /// Lagrange polynomials at the start of the step.
+    /// Values of the Lagrange polynomials at the start of the step.
     pub lagrange_start: [E; S],
-    /// Lagrange polynomials at its end.
+    /// Values of the Lagrange polynomials at the end of the step.
     pub lagrange_end: [E; S],
-    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them;
-    /// if there are any.
+    /// Values of the Lagrange polynomials at the stages of a next step of the same size, one row
+    /// for each of its stages; `None` without extrapolation.
     pub lagrange_next: Option<[[E; S]; S]>,
-    /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
+    /// The eigenbasis of `A`; `None` if stage-wise blocks are cheaper.
     pub eigenbasis: Option<Eigenbasis<E, S, S>>,
     pub tableau: Tableau<S>,
 }
 
 impl<E: Lanes, const S: usize> Coefficients<E, S> {
-    /// With the eigenbasis, if `shared` Jacobians are to be used. Not inlined: callers would have
-    /// each of its numbers by itself.
+    /// Converts the tableau; with the eigenbasis if `shared` Jacobians are used. Not inlined, since
+    /// inlining would scalarise every coefficient in the caller.
     #[cfg_attr(feature = "std", inline(never))]
     pub fn new(tableau: Tableau<S>, shared: bool) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
-            // The last stage is the end: not even a rounding error apart.
+            // The last node is the end of the step: exactly 1, without rounding error.
             end = [0.0; S];
             if let Some(last) = end.last_mut() {
                 *last = 1.0;
@@ -43,7 +43,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             c: cast_row(tableau.c()),
             lagrange_start: cast_row(&tableau.lagrange(0.0)),
             lagrange_end: cast_row(&end),
-            // Polynomials of higher degree are not worth much outside of their interval.
+            // Extrapolation by polynomials of higher degree is inaccurate.
             lagrange_next: (finite && S <= 4).then(|| cast_matrix(&next)),
             eigenbasis: if const { S < 3 } || !shared { None } else { Eigenbasis::new(&tableau) },
             tableau,
@@ -51,7 +51,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
     }
 }
 
-/// As numbers of the integrator. Loops are quicker to compile than what maps arrays.
+/// Converts to the number type of the integrator. A loop compiles faster than `map`.
 #[inline(always)]
 fn cast_row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
     let mut to = [E::from_f64(0.0); S];

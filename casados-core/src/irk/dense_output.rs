@@ -1,4 +1,4 @@
-//! The solution between the stages: the collocation polynomial of the step that contains the time.
+//! Dense output: the collocation polynomial of the step that contains the time.
 //!
 //! ```text
 //! x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i        z(t_n + θh) = Σ_i ℓ_i(θ) z_i
@@ -17,7 +17,7 @@ use crate::scalar::Real;
 use crate::shape::Matrix;
 use crate::tableau::Tableau;
 
-/// A time as a point of a step.
+/// The step that contains a time, and the weights at that time.
 pub(crate) struct StepPoint<T, const S: usize> {
     pub step: usize,
     /// `b_i(θ)`
@@ -58,7 +58,7 @@ impl<T: Real, const S: usize> StepPoint<T, S> {
         } else {
             (t - start).to_f64() / inputs.time.step.to_f64()
         };
-        // A cast saturates, so that no position is beyond the last step.
+        // The cast saturates, so that `min` returns the last step for large values.
         let step = (position as usize).min(steps - 1);
         let theta = position - step as f64;
         Ok(Self {

@@ -1,8 +1,8 @@
 //! Directions of sensitivities, in panels.
 //!
-//! A panel is a few columns of everything that has a column for each direction: rows `[E; W]` that
-//! fit registers. Panels lie one after the other, so that all that is done to one happens in the
-//! nearest cache.
+//! A panel is a group of columns of the matrices that have one column per direction: its rows
+//! `[E; W]` fit registers. Panels lie one after the other, so that all operations on a panel use
+//! the L1 cache.
 
 use crate::memory::Fallback;
 use crate::model::{Dae, NO_COLUMN};
@@ -11,21 +11,21 @@ use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Field, Lanes};
 use crate::shape::Shape;
 
-/// So many bytes are in the nearest cache, beside others.
+/// Size of the L1 cache in bytes.
 pub(super) const L1_CACHE_BYTES: usize = 1 << 15;
 
-/// How many columns the widest panels have: eight; of numbers that are registers themselves four,
-/// or the panel row of all stages would not fit beside what it is multiplied by. Of two stages
-/// eight do where there are thirty-two registers: if columns are many, factors, which then come
-/// from the second cache, are read half as often.
+/// Number of columns of the widest panels: eight for scalars. For SIMD registers four, so that the
+/// panel row of all stages and its multipliers fit the register file; eight for two stages if there
+/// are thirty-two registers and many columns: the factors, then in the L2 cache, are read half as
+/// often.
 pub(super) const fn panel_width<E>(stages: usize, count: usize) -> usize {
     let allows_wide_panels = size_of::<E>() == 64 && stages <= 2 && count >= 16;
     if size_of::<E>() <= 8 || allows_wide_panels { 8 } else { 4 }
 }
 
-/// How many columns the panels of so many directions have together, where there is memory for
-/// `most`. Where two narrow panels would follow the wide ones, columns of zeros make them one:
-/// registers compute these beside the others, and each width has code of its own.
+/// Number of columns of all panels, at most `max_columns`. Two narrow panels after the wide ones
+/// are merged into one, padded with columns of zeros: each width needs its own code, and the
+/// padding costs no extra SIMD instructions.
 const fn padded_columns<E>(directions: usize, max_columns: usize) -> usize {
     let columns = match directions % 8 {
         5.. if size_of::<E>() <= 8 => directions.next_multiple_of(8),
@@ -35,16 +35,16 @@ const fn padded_columns<E>(directions: usize, max_columns: usize) -> usize {
     if REGISTERS && columns <= max_columns { columns } else { directions }
 }
 
-/// A number for each column of panels of all directions: there is memory for whole panels where
-/// machines may have registers of several numbers.
+/// A number for each column of all panels. Targets with SIMD registers have memory for whole
+/// panels.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
 pub type ArrayC<M, T> = <<M as Dae>::Shape as Shape>::ArrayC<T>;
 /// A number for each direction.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")))]
 pub type ArrayC<M, T> = crate::model::ArrayW<M, T>;
 
-/// How many columns panels of all directions have together: whole panels, where kernels are not
-/// compiled for one model and there is memory for them.
+/// Number of columns of the panels of all directions. Kernels that are compiled for all models have
+/// whole panels, if there is memory for them.
 pub(super) const fn total_columns<M: Dae, E, F: Fallback>() -> usize {
     let (directions, most) = (M::STRUCTURE.directions.len(), M::Shape::NC);
     let full_panel_columns = directions.next_multiple_of(8);
@@ -55,7 +55,7 @@ pub(super) const fn total_columns<M: Dae, E, F: Fallback>() -> usize {
     }
 }
 
-/// The same, if it is known when kernels are compiled.
+/// Number of columns of all panels, if it is known at compile time.
 pub(super) const fn static_columns<P: Plan, E>() -> Option<usize> {
     match P::KNOWN_STRUCTURE {
         Some(structure) => Some(padded_columns::<E>(structure.directions.len(), P::NC)),
@@ -63,8 +63,8 @@ pub(super) const fn static_columns<P: Plan, E>() -> Option<usize> {
     }
 }
 
-/// Whether some panels of so many columns have this width. Of any number of columns they have the
-/// width of most, or one.
+/// Whether some panels of `count` columns have this width. If `count` is known at run time only,
+/// panels have eight columns (four of SIMD registers) or one.
 pub(super) const fn have_panels<E>(count: Option<usize>, stages: usize, columns: usize) -> bool {
     match (count, columns) {
         (None, 8) => size_of::<E>() <= 8,
@@ -76,9 +76,9 @@ pub(super) const fn have_panels<E>(count: Option<usize>, stages: usize, columns:
     }
 }
 
-/// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many
-/// as [`width`] says, four, two or one, of `$count` columns, which are `$known` when kernels are
-/// compiled or not. It may begin with a later panel.
+/// Evaluates an expression for each panel of `$S` stages, from `$column` on, with `$W` columns: as
+/// many as [`panel_width`] returns, four, two or one. `$count` is the number of columns, `$known`
+/// the number at compile time, if it is known. `from` begins with a later panel.
 macro_rules! panels {
     ([$known:expr, $count:expr], $E:ty, $S:expr, $column:ident, $W:ident => $panel:expr) => {
         panels!([$known, $count], $E, $S, $column from 0, $W => $panel)
@@ -116,7 +116,7 @@ macro_rules! panels {
 }
 pub(super) use panels;
 
-/// Where the panel of a column begins, and how many columns it has.
+/// Returns the first column and the width of the panel that contains a column.
 #[inline(always)]
 pub(super) const fn panel_of<E>(known: bool, column: usize, count: usize, stages: usize) -> (usize, usize) {
     let (mut begin, mut width) = (0, panel_width::<E>(stages, count));
@@ -132,33 +132,33 @@ pub(super) const fn panel_of<E>(known: bool, column: usize, count: usize, stages
     }
 }
 
-/// The rows of a panel that begins with a column, of a matrix with so many rows.
+/// Returns the rows of the panel that begins with `column`, of a matrix with `rows` rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel<E, const W: usize>(panels: &[E], column: usize, rows: usize) -> &[[E; W]] {
     panels.get(column * rows..(column + W) * rows).unwrap_or_default().as_chunks().0
 }
 
-/// The rows of a panel that begins with a column, of a matrix with so many rows.
+/// Returns the rows of the panel that begins with `column`, of a matrix with `rows` rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows: usize) -> &mut [[E; W]] {
     panels.get_mut(column * rows..(column + W) * rows).unwrap_or_default().as_chunks_mut().0
 }
 
-/// How the directions depend on `w`.
+/// The dependence of the directions on `w`.
 pub(crate) trait Directions<E>: Copy {
-    /// How many columns their panels have, if that is known when kernels are compiled.
+    /// Number of columns of the panels, if it is known at compile time.
     const COLUMNS: Option<usize>;
-    /// Whether each is an element of `w`.
+    /// Whether each direction is an element of `w`.
     const ARE_UNIT_VECTORS: bool = false;
-    /// How many columns their panels have.
+    /// Number of columns of the panels.
     fn columns(self) -> usize;
-    /// The column of an element of `w`, if that is a direction.
+    /// The column of an element of `w`, if it is a direction.
     fn column(self, _index: usize) -> Option<usize> {
         None
     }
     /// `row += factor · dw_index`, in the columns from `column` on.
     fn add_scaled<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]);
-    /// `Σ_c weight_c dw_index,c` over all columns, with the weights of the first sum or the second.
+    /// `Σ_c weight_c dw_index,c` over all columns, with the first or the second set of weights.
     fn weighted_sum(self, index: usize, with_second_weights: bool) -> E;
 }
 
@@ -169,11 +169,11 @@ pub(crate) struct IdentityDirections<P> {
     columns: usize,
 }
 
-/// That of the plan which an integrator has for its model.
+/// Unit directions of the plan that an integrator has for its model.
 pub(crate) type IdentityDirectionsOf<M, F> = IdentityDirections<<F as Fallback>::Plan<M>>;
 
 impl<P: Plan> IdentityDirections<P> {
-    /// Of numbers `E`.
+    /// Directions for panels of numbers `E`.
     #[inline(always)]
     pub(crate) fn for_model<M: Dae, E, F: Fallback<Plan<M> = P>>() -> Self {
         Self { plan: F::plan::<M>(), columns: const { total_columns::<M, E, F>() } }
@@ -221,7 +221,7 @@ impl<P: Plan, E: Lanes> Directions<E> for IdentityDirections<P> {
     }
 }
 
-/// The rows of a matrix: each direction is a column.
+/// Given directions: rows of a matrix whose columns are the directions.
 #[derive(Clone, Copy)]
 pub(crate) struct SeedDirections<'a, E, const C: usize>(pub &'a [[E; C]]);
 
@@ -251,8 +251,8 @@ impl<E: Lanes, const C: usize> Directions<E> for SeedDirections<'_, E, C> {
     }
 }
 
-/// The weight of a direction in the first sum over all of them, or in the second: neither equal nor
-/// alternating, so that no structure hides an error.
+/// The weight of a direction in the first or the second checksum: neither equal nor alternating, so
+/// that no structure of the model hides an error.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn checksum_weight<E: Field>(direction: usize, with_second_weights: bool) -> E {
     let rank = if with_second_weights { 2 * direction + 1 } else { 3 * direction } % 7;
@@ -265,7 +265,7 @@ mod tests {
     use crate::scalar::lanes::{F64x4, F64x8};
     use alloc::vec::Vec;
 
-    /// The widths of panels that follow each other, of so many columns.
+    /// The widths of the panels of `columns` columns.
     fn widths<E>(columns: usize, stages: usize) -> Vec<usize> {
         let (mut widths, mut column) = (Vec::new(), 0);
         while column < columns {
@@ -281,8 +281,8 @@ mod tests {
         widths
     }
 
-    /// Panels cover all directions, and have two widths at most: one of eight columns and a
-    /// narrower one. Registers themselves may have a panel of two or of one column beside others.
+    /// Panels cover all directions and have at most two widths: eight columns and a narrower one.
+    /// Panels of SIMD registers may have a further one of one or two columns.
     #[test]
     fn panels_have_few_widths() {
         for directions in 1..50 {
@@ -301,7 +301,7 @@ mod tests {
                 narrow.retain(|&width| width < 4);
                 assert!(narrow.len() <= 1, "{directions}: {narrow:?}");
             }
-            // Without memory for more, columns are directions.
+            // Without memory for padding, there is one column for each direction.
             assert_eq!(padded_columns::<f64>(directions, directions), directions);
         }
     }

@@ -1,5 +1,5 @@
-//! What all calls of an integrator share: arguments checked, steps taken, and these kept only if
-//! everything succeeded.
+//! The driver of all calls of an integrator: checks arguments, takes the steps, and commits them if
+//! the whole call succeeds.
 
 use super::step::IntervalScheme;
 use super::workspace::{StageWorkspace, Step};
@@ -19,38 +19,39 @@ use crate::shape::{Matrix, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 
-/// The part of an integrator that every call needs.
+/// The part of an integrator that all calls share.
 pub(crate) struct Driver<M: Dae, T: Real, const S: usize, W: Memory> {
     pub options: Options,
     pub coefficients: Coefficients<T, S>,
     pub statistics: Statistics,
     workspace: W::Nominal<StageWorkspace<M, T, S, W::Fallback>>,
-    /// The steps of the last successful call, and those of the call that runs.
+    /// The steps of the last successful call, and those of the current call.
     tapes: [W::Tape<Step<M, T, S>>; 2],
     last_tape: usize,
     /// Whether any call succeeded.
     has_result: bool,
-    /// Whether the last steps are a warm start.
+    /// Whether the last steps serve as a warm start.
     has_warm_start: bool,
-    /// Whether their stages are the solution of the next call.
+    /// Whether their stages are the solution of the next call (see
+    /// [`set_solution`](Self::set_solution)).
     initial_is_solution: bool,
     start_given: bool,
     parameters_set: bool,
     time: T,
 }
 
-/// The arguments of a call that are the same for all.
+/// The arguments that all calls have.
 pub(crate) struct Arguments<'a, M: Dae, T: Real> {
     pub x0: &'a VectorX<M, T>,
     pub u: &'a VectorU<M, T>,
     pub h: T,
 }
 
-/// What a call has to work with after a step, and after all of them.
+/// The data of a call after a step, and after all steps.
 pub(crate) struct CallContext<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
     pub workspace: &'a mut StageWorkspace<M, T, S, F>,
     pub coefficients: &'a Coefficients<T, S>,
-    /// All steps; none as long as they are being taken.
+    /// All steps; empty while steps are being taken.
     pub steps: &'a [Step<M, T, S>],
     pub statistics: &'a mut Statistics,
 }
@@ -76,7 +77,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(Self::without_memory(options, coefficients, T::ZERO))
     }
 
-    /// Without memory, and with nothing set but these.
+    /// A driver without allocated memory, with these settings.
     fn without_memory(options: Options, coefficients: Coefficients<T, S>, time: T) -> Self {
         Self {
             options,
@@ -94,13 +95,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         }
     }
 
-    /// The tape of the last successful call, and that of the call that runs.
+    /// Returns the tape of the last successful call, and that of the current call.
     fn tapes(tapes: &mut [W::Tape<Step<M, T, S>>; 2], last: usize) -> [&mut W::Tape<Step<M, T, S>>; 2] {
         let [first, second] = tapes;
         if last == 0 { [first, second] } else { [second, first] }
     }
 
-    /// The steps of the last successful call.
+    /// Returns the steps of the last successful call.
     #[cfg(feature = "alloc")]
     fn last_steps(&mut self) -> Result<&mut [Step<M, T, S>], Error> {
         let [last, _] = Self::tapes(&mut self.tapes, self.last_tape);
@@ -143,14 +144,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(())
     }
 
-    /// What a call needs before its steps. A call that is refused without it has used up a solution
-    /// that it was given.
+    /// Discards a given solution if a call fails before its first step.
     pub fn invalidate_solution_on_error<R>(&mut self, result: Result<R, Error>) -> Result<R, Error> {
         self.initial_is_solution &= result.is_ok();
         result
     }
 
-    /// The steps of a call, with `after` called after each.
+    /// Takes the steps of a call; calls `after_step` after each.
     pub fn run_steps(
         &mut self,
         arguments: &Arguments<'_, M, T>,
@@ -163,7 +163,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
     ) -> Result<CallContext<'_, M, T, S, W::Fallback>, Error> {
         let Self { options, coefficients, statistics, workspace: work, tapes, .. } = self;
         *statistics = Statistics::default();
-        // Of this call alone, refused or not.
+        // A given solution is valid for one call, even if it fails.
         let initial_is_solution = core::mem::take(&mut self.initial_is_solution);
         check_model_input::<M, T>(Argument::X0, arguments.x0.as_slice())?;
         check_model_input::<M, T>(Argument::U, arguments.u.as_slice())?;
@@ -180,7 +180,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         work.inputs.time.step = arguments.h / T::from_whole(options.steps);
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
         let [last, current_tape] = Self::tapes(tapes, self.last_tape);
-        // Both in the first call: later ones do not allocate.
+        // Both tapes are allocated in the first call, so that later calls do not allocate.
         let steps = W::tape(current_tape, options.steps)?;
         let last = W::tape(last, options.steps)?;
         let guess = match options.start {
@@ -203,15 +203,15 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(CallContext { workspace: work, coefficients, steps, statistics })
     }
 
-    /// Whether start values are solutions but for their last digits.
+    /// Sets whether start values are solutions up to rounding.
     #[cfg(feature = "alloc")]
     pub fn set_start_near_solution(&mut self, near_solution: bool) -> Result<(), Error> {
         W::nominal(&mut self.workspace)?.start_near_solution = near_solution;
         Ok(())
     }
 
-    /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages
-    /// innermost.
+    /// Sets start values of the stages of the first step as a warm start: the unknowns `(k, z)`,
+    /// stages innermost.
     #[cfg(feature = "alloc")]
     pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
         if let Some(step) = self.last_steps()?.first_mut() {
@@ -223,21 +223,22 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(())
     }
 
-    /// The variables at the stages where the last call ended, successful or not.
+    /// Returns the variables at the stages of the last evaluation of the last call, successful or
+    /// not.
     #[cfg(feature = "alloc")]
     pub fn points(&mut self) -> Result<&ArrayV<M, [T; S]>, Error> {
         Ok(&W::nominal(&mut self.workspace)?.points)
     }
 
-    /// The error of the last call, whose first step started at `y`, with what that has to do with
-    /// it.
+    /// Adds to the error of the last call the algebraic state that led to it, and its value in `y`,
+    /// the start values of the first step.
     #[cfg(feature = "alloc")]
     pub fn explain_with_start(&mut self, error: Error, y: &[T]) -> Error {
         let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
-        W::nominal(&mut self.workspace).map_or(error, |work| work.explain_with_start(error, &start))
+        W::nominal(&mut self.workspace).map_or(error, |work| work.add_start_value(error, &start))
     }
 
-    /// The stages of every step, as a warm start.
+    /// Sets the stages of every step as a warm start.
     #[cfg(feature = "alloc")]
     pub fn set_stages_of_steps(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         for (step, y) in self.last_steps()?.iter_mut().zip(stages) {
@@ -247,7 +248,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(())
     }
 
-    /// The stages of every step of the next call.
+    /// Sets the stages of every step of the next call, which are a solution.
     #[cfg(feature = "alloc")]
     pub fn set_solution(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         self.set_stages_of_steps(stages)?;
@@ -255,7 +256,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(())
     }
 
-    /// Everything succeeded: the steps of this call are those to keep.
+    /// Commits the steps of a successful call.
     pub fn commit(&mut self) -> Result<&StageWorkspace<M, T, S, W::Fallback>, Error> {
         let work = W::nominal(&mut self.workspace)?;
         work.last_inputs = work.inputs;
@@ -265,7 +266,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
         Ok(work)
     }
 
-    /// The last successful call.
+    /// Returns the context of the last successful call.
     pub fn last_call(&mut self) -> Result<CallContext<'_, M, T, S, W::Fallback>, Error> {
         if !self.has_result {
             return Err(Error::NoResult);
@@ -284,8 +285,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
 
 #[cfg(feature = "alloc")]
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Driver<M, T, S, Heap<F>> {
-    /// The same settings with memory of its own. Parameters and start values for which there is no
-    /// memory are as if they had never been set.
+    /// Returns a driver with the same settings and its own memory. Parameters and start values that
+    /// cannot be allocated are as if never set.
     pub fn clone_settings(&self) -> Self {
         let mut run = Self::without_memory(self.options, self.coefficients.clone(), self.time);
         let set = self.workspace.get().filter(|_| self.parameters_set || self.start_given);
@@ -298,7 +299,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Driver<M, T, S, Heap<F>> {
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> CallContext<'_, M, T, S, F> {
-    /// See [`Work::linearize`].
+    /// See [`StageWorkspace::linearize`].
     pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
         self.workspace.linearize(self.coefficients, n, step, exact, self.statistics)
     }

@@ -1,4 +1,4 @@
-//! An integrand at the stages of the steps, and what it adds to their adjoint; see
+//! Evaluates an integrand at the stages of the steps, and adds its source terms to the adjoint; see
 //! [`quadrature`](crate::quadrature).
 //!
 //! With `g_i = h b_i ∇_v φ_i`:
@@ -24,7 +24,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// The variables at a stage, which are in `points`, to where the integrand takes them from.
+    /// Copies the variables at a stage from `points` to the input of the integrand.
     fn load_stage<'a>(
         &self,
         stage: usize,
@@ -38,7 +38,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         integrand
     }
 
-    /// What the stages of a step add to the value.
+    /// Adds the contribution of the stages of a step to the value.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -57,7 +57,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         Ok(())
     }
 
-    /// What they add to the right-hand side of the adjoint, and to what comes out of it.
+    /// Adds the contribution of the stages to the source terms of the adjoint.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -97,7 +97,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> CallContext<'_, M, T, S, F> {
-    /// What the stages of a step add to the value and its derivatives, with those of the stages.
+    /// Adds the contribution of the stages of a step to the value and its derivatives, which follow
+    /// from the stage derivatives.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -124,8 +125,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> CallContext<'_, M, T, S, F> {
 }
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
-    /// those of the solution; see [`quadrature`](crate::quadrature).
+    /// Adds a quadrature: computes the value and the derivatives of `∫ l(x, z, u, p, t) dt`
+    /// together with the solution; see [`quadrature`](crate::quadrature).
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,

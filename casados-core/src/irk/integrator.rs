@@ -1,5 +1,4 @@
-//! The integrator as its users see it: how it is made, what is set, simulation. Its derivatives are
-//! in `sensitivities`.
+//! The integrator: construction, settings, simulation. Its derivatives are in `sensitivities`.
 
 use super::adjoint::Adjoints;
 use super::dense_output::StepPoint;
@@ -28,20 +27,20 @@ use core::marker::PhantomData;
 /// integrator.
 ///
 /// # Start values
-/// The stages of the first step are found by Newton's method from `z` at the nominal values of the
-/// model, `#[dae(nominal(z = 0.1))]`, which are zero where the attribute says nothing, and `ẋ = 0`;
-/// from the values of [`set_start`](Self::set_start) if that was called; with
-/// [`Start::Warm`](crate::options::Start) from the stages of the last call. Later steps continue
-/// the solution of the step before. Of several roots of the equations the one is taken to which
-/// Newton's method leads from there, which need not be the nearest: which one it is, the result
-/// `z0` tells.
+/// Newton's method finds the stages of the first step. By default it starts from `ẋ = 0` and the
+/// nominal values of `z` in the model, `#[dae(nominal(z = 0.1))]`, or zero without the attribute;
+/// after [`set_start`](Self::set_start) from its values; with
+/// [`Start::Warm`](crate::options::Start) from the stages of the last call. Later steps extrapolate
+/// the preceding step. If the equations have several roots, the result is the root that Newton's
+/// method reaches from the start values, not necessarily the nearest; `z0` of the result shows
+/// which.
 ///
 /// # Errors
-/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`], [`Error::StartNotGiven`],
+/// Every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`], [`Error::StartNotGiven`],
 /// [`Error::NonFiniteModel`], [`Error::NonFiniteStart`], [`Error::Singular`],
-/// [`Error::NotConverged`], [`Error::Overflow`], and [`Error::OutOfMemory`] of the first call of
-/// its kind. Then the integrator is as it was before the call: usable, with the same warm start and
-/// the same dense output.
+/// [`Error::NotConverged`], [`Error::Overflow`]; the first call of each kind also
+/// [`Error::OutOfMemory`]. After an error the integrator is as before the call: usable, with the
+/// same warm start and the same dense output.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -70,7 +69,7 @@ pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
 
 #[cfg(feature = "alloc")]
 impl<M: Dae, B: Method<S>, const S: usize, T: Real, F: Fallback> Integrator<M, B, S, T, Heap<F>> {
-    /// An integrator with its memory on the heap.
+    /// Returns an integrator with its memory on the heap.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
@@ -81,7 +80,7 @@ impl<M: Dae, B: Method<S>, const S: usize, T: Real, F: Fallback> Integrator<M, B
 
 #[cfg(feature = "alloc")]
 impl<M: Dae, const S: usize, T: Real, F: Fallback> Integrator<M, Custom<S>, S, T, Heap<F>> {
-    /// An integrator for a tableau of the user's own, with its memory on the heap.
+    /// Returns an integrator for a user-defined tableau, with its memory on the heap.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
@@ -96,7 +95,7 @@ impl<M: Dae, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: 
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator that is its own memory, for at most `STEPS` steps.
+    /// Returns an integrator that contains its memory, for at most `STEPS` steps.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
@@ -110,8 +109,8 @@ impl<M: Dae, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fall
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS`
-    /// steps.
+    /// Returns an integrator for a user-defined tableau that contains its memory, for at most
+    /// `STEPS` steps.
     ///
     /// # Errors
     /// As `with_tableau`.
@@ -120,8 +119,8 @@ where
     }
 }
 
-/// An integrator with the same options, parameters, time and start values: its memory is its own,
-/// and empty until the first call.
+/// Copies options, parameters, time and start values. The copy has its own memory, which is empty
+/// until its first call.
 #[cfg(feature = "alloc")]
 impl<M: Dae, B, const S: usize, T: Real, F: Fallback> Clone for Integrator<M, B, S, T, Heap<F>> {
     fn clone(&self) -> Self {
@@ -140,14 +139,14 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> core::fmt::Debug for Integra
 }
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
+    /// Size of the integrator in bytes. With [`Inline`] memory this is its total memory.
     pub const SIZE: usize = size_of::<Self>();
 
     pub(crate) fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Ok(Self::without_memory(Driver::new(options, tableau)?))
     }
 
-    /// Without memory for derivatives.
+    /// Returns an integrator without memory for derivatives.
     fn without_memory(run: Driver<M, T, S, W>) -> Self {
         Self {
             run,
@@ -161,66 +160,66 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         }
     }
 
-    /// As `build`, and what a first call would prepare: none takes longer than the others.
+    /// Like `build`, with all preparations of a first call, so that no call takes longer than
+    /// others.
     fn with_reserved_memory(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         let mut integrator = Self::build(options, tableau)?;
         integrator.reserve()?;
         Ok(integrator)
     }
 
-    /// The parameters `p` of all following calls.
+    /// Sets the parameters `p` of all following calls.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last parameters stay.
+    /// [`Error::NonFiniteInput`]; the last parameters remain valid.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         self.run.set_parameters(p)
     }
 
-    /// The time at the start of the interval of all following calls; zero if never set. It does not
-    /// move on by itself.
+    /// Sets the time at the start of the interval for all following calls; the default is zero.
+    /// Calls do not advance it.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last time stays.
+    /// [`Error::NonFiniteInput`]; the last time remains valid.
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
         self.run.set_time(t)
     }
 
-    /// Start values `ẋ` and `z` for Newton's method, at all stages, instead of the nominal values
-    /// of the model: with [`Start::Zero`](crate::options::Start) they are not read, and with
-    /// `Start::Warm` only where there is no warm start. Of states that are
-    /// [kinematic](crate::model::Kinematic) `ẋ` is known, and is not read. They stay until they are
-    /// set again.
+    /// Sets start values `ẋ` and `z` of Newton's method, at all stages, for all following calls;
+    /// they replace the nominal values of the model. They are not read with
+    /// [`Start::Zero`](crate::options::Start), and with `Start::Warm` only without a warm start.
+    /// `ẋ` of [kinematic](crate::model::Kinematic) states is computed, not read.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last values stay.
+    /// [`Error::NonFiniteInput`]; the last values remain valid.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         self.run.set_start(xdot, z)
     }
 
-    /// Forgets the warm start.
+    /// Discards the warm start.
     pub fn reset(&mut self) {
         self.run.reset();
     }
 
-    /// The options.
+    /// Returns the options.
     #[must_use]
     pub fn options(&self) -> &Options {
         &self.run.options
     }
 
-    /// The tableau.
+    /// Returns the tableau.
     #[must_use]
     pub fn tableau(&self) -> &Tableau<S> {
         &self.run.coefficients.tableau
     }
 
-    /// What the last call did, successful or not.
+    /// Returns the statistics of the last call, successful or not.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         &self.run.statistics
     }
 
-    /// The stages of every step of the next call, which has only to differentiate them.
+    /// Sets the stages of every step of the next call, which only differentiates them.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -239,15 +238,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages
-    /// innermost.
+    /// Returns the unknowns `(k, z)` at the stages of the first step of the last successful call,
+    /// stages innermost.
     #[cfg(feature = "alloc")]
     pub(crate) fn stages(&mut self) -> Result<&[T], Error> {
         let steps = self.run.last_call()?.steps;
         Ok(steps.first().map_or(&[], |step| step.y.as_ref().as_flattened()))
     }
 
-    /// Allocates what `solve` needs, so that no call of it will.
+    /// Allocates the memory of `solve`, so that its calls do not allocate.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -255,7 +254,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.reserve()
     }
 
-    /// `x₊` at the end of an interval of length `h`, and `z` at both ends.
+    /// Returns `x₊` at the end of an interval of length `h`, and `z` at both ends.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -263,12 +262,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.solve_with_quadrature(x0, u, h, None)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last
+    /// Returns the solution at the time `t` (time of the model) inside the interval of the last
     /// successful call.
     ///
     /// # Errors
     /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`],
-    /// [`Error::Overflow`]; [`Error::NoInterpolation`] if the tableau is not one of collocation.
+    /// [`Error::Overflow`]; [`Error::NoInterpolation`] if the tableau is no collocation method.
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         let last = self.run.last_call()?;
         let work = last.workspace;

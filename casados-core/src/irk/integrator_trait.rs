@@ -1,4 +1,4 @@
-//! The calls that all integrators have in common.
+//! The trait of all integrators.
 
 use super::driver::Arguments;
 use super::integrator::Integrator;

@@ -2,7 +2,7 @@
 
 use crate::model::{Dae, Pattern};
 
-/// The entries of a Jacobian: row, column, value.
+/// Iterates over the entries of a Jacobian: row, column, value.
 #[inline(always)]
 pub(crate) fn entries<M: Dae, V>(jacobian: &[V]) -> impl Iterator<Item = (usize, usize, &V)> {
     let Pattern { rows, columns } = M::STRUCTURE.jacobian;

@@ -8,17 +8,17 @@
 //! ```
 //!
 //! by Newton's method. Sensitivities are the exact derivatives of this discrete map, by the
-//! implicit function theorem at the converged stages: the Jacobian is evaluated and factorised
-//! there, whatever the iteration took. `z` at the ends of an interval is the polynomial through the
-//! stages; for stiffly accurate methods its value at the end is the last stage.
+//! implicit function theorem: the Jacobian is evaluated and factorised at the converged stages,
+//! independently of the Jacobians of the iterations. `z` at the ends of an interval is the value of
+//! the polynomial through the stages; for stiffly accurate methods its value at the end is the last
+//! stage.
 //!
-//! In the order of a call: `integrator` and `sensitivities` are what users see, `driver` what all
-//! calls share, `step` the loop over the steps, `stages` the model at them, `newton` the iteration
-//! that solves them. Derivatives go `forward`, backwards by the `adjoint`, and to second order with
-//! the `hessian`; each is held against its own equations by its `backward_error`. An `integrand` is
-//! summed up along the way, `dense_output` interpolates. `kinematic` states are no unknowns;
-//! `directions` are what derivatives are found in. `coefficients`, `jacobian_entries`,
-//! `stage_array` and `workspace` are the data.
+//! Modules, in the order of a call: `integrator` and `sensitivities` are the public interface,
+//! `driver` is the part that all calls share, `step` the loop over the steps, `stages` the model at
+//! the stages, `newton` their solution. `forward`, `adjoint` and `hessian` compute derivatives;
+//! `backward_error` checks them. `integrand` evaluates quadratures, `dense_output` interpolates.
+//! `kinematic` condenses kinematic states; `directions` are the directions of derivatives.
+//! `coefficients`, `jacobian_entries`, `stage_array` and `workspace` are the data.
 
 mod adjoint;
 mod backward_error;
@@ -47,7 +47,7 @@ pub use forward::{
 };
 pub use integrator::Integrator;
 
-// What steps of variable size are made of too.
+// Also used by adaptive integrators.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
     coefficients::{Coefficients, dot},
@@ -74,21 +74,21 @@ use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 /// x_{n+1} = x_n + h Σ_i b_i k_i
 /// ```
 ///
-/// It is an [`Integrator`], whose page has all that it can do:
+/// It is an [`Integrator`], with these functions:
 ///
 /// | | |
 /// | --- | --- |
-/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a tableau of one's own |
+/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a user-defined tableau |
 /// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, start values of `ẋ` and `z` |
 /// | [`solve`](Integrator::solve) | `x₊`, and `z` at both ends |
 /// | [`forward`](Integrator::forward), [`directional`](Integrator::directional) | and derivatives by `(x₀, u, p)`: all of them, or in given directions |
 /// | [`adjoint`](Integrator::adjoint), [`adjoint_many`](Integrator::adjoint_many) | and gradients of `λᵀx₊` |
 /// | [`hessian`](Integrator::hessian), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients with second derivatives, or with first ones |
 /// | [`dense`](Integrator::dense), [`dense_forward`](Integrator::dense_forward) | the solution inside the last interval |
-/// | [`with`](Integrator::with) | integrals along the way |
-/// | [`statistics`](Integrator::statistics) | what the last call did |
+/// | [`with`](Integrator::with) | quadratures |
+/// | [`statistics`](Integrator::statistics) | statistics of the last call |
 ///
-/// By default, one step in each interval, and Newton's method to rounding:
+/// By default an interval is one step, and Newton's method converges to rounding:
 /// [`Options`](crate::Options). Units are those of the model; results have its dimensions.
 ///
 /// # Errors
@@ -121,7 +121,7 @@ pub type Irk<M, B, T = f64, W = crate::memory::Heap> = <B as Implicit>::Integrat
 #[cfg(not(feature = "alloc"))]
 pub type Irk<M, B, T, W> = <B as Implicit>::Integrator<M, T, W>;
 
-/// A method that an implicit integrator takes.
+/// A method of an implicit integrator.
 ///
 /// ```
 /// use casados::irk::Implicit;

@@ -1,18 +1,18 @@
-//! Arrays that have the numbers of all stages side by side, looked at from a stage on.
+//! Arrays with the numbers of all stages adjacent, and views of them that begin with a stage.
 #![allow(unsafe_code)]
 
 use crate::shape::{Array, Plain};
 use bytemuck::Zeroable;
 use core::ops::{Deref, DerefMut};
 
-/// An array of cells `[T; S]`, and a cell's worth of numbers behind it.
+/// An array of cells `[T; S]`, followed by one cell of padding.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 #[zeroable(bound = "A: Zeroable, T: Zeroable")]
 #[repr(C)]
 pub(crate) struct StageArray<A, T, const S: usize> {
     cells: A,
-    /// For the last cells of what begins with another stage: nothing that is looked for there is
-    /// ever written.
+    /// Padding of views that begin with a later stage: their last cells extend into it. It is never
+    /// written.
     padding: [T; S],
 }
 
@@ -32,18 +32,18 @@ impl<A, T, const S: usize> DerefMut for StageArray<A, T, S> {
 }
 
 impl<A: Array<[T; S]>, T: Plain, const S: usize> StageArray<A, T, S> {
-    /// Cells that begin with the number of a stage.
+    /// A view of the array whose cells begin with the number of a stage.
     #[inline(always)]
     pub fn stage_view(&self, stage: usize) -> &A {
         let stage = stage.min(S);
-        // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these; behind
-        // it, in the same struct and without a gap, as both are aligned as `T` is, lie `S` more of
-        // `T`. So from its number `stage ≤ S` on there are as many as it has, which are numbers,
-        // aligned as they ask, and borrowed with `self`.
+        // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these. `S` more
+        // numbers `T` follow it in the same struct, without a gap, since both are aligned as `T`.
+        // So the memory from number `stage ≤ S` on contains as many initialised and aligned numbers
+        // as `A`, borrowed with `self`.
         unsafe { &*core::ptr::from_ref(self).cast::<T>().add(stage).cast::<A>() }
     }
 
-    /// Cells that begin with the number of a stage.
+    /// A view of the array whose cells begin with the number of a stage.
     #[inline(always)]
     pub fn stage_view_mut(&mut self, stage: usize) -> &mut A {
         let stage = stage.min(S);
@@ -56,8 +56,8 @@ impl<A: Array<[T; S]>, T: Plain, const S: usize> StageArray<A, T, S> {
 mod tests {
     use super::*;
 
-    /// What is seen from a stage are its numbers, in the order of the cells, and nothing else is
-    /// written.
+    /// A view contains the numbers of its stage, in the order of the cells; writing to it changes
+    /// nothing else.
     #[test]
     fn first_numbers_are_those_of_the_stage() {
         let mut stages: StageArray<[[f64; 4]; 3], f64, 4> = Zeroable::zeroed();
@@ -72,7 +72,7 @@ mod tests {
             let seen = stages.stage_view(stage);
             assert_eq!(seen.map(|cell| cell[0]), [0.0, 10.0, 20.0].map(|first| first + stage as f64));
         }
-        // Beyond the last stage there is one cell more, and no further.
+        // A view beyond the last stage begins with the padding.
         assert_eq!(stages.stage_view(9)[2], [0.0; 4]);
     }
 }

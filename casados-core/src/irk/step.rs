@@ -1,4 +1,4 @@
-//! The steps of an interval, one after the other.
+//! The loop over the steps of an interval.
 
 use super::newton::dense_fallback::unknown_name;
 use super::newton::iteration::StageEquations;
@@ -17,7 +17,7 @@ use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Matrix, Shape, copy_into};
 use crate::statistics::Statistics;
 
-/// How an interval is integrated.
+/// The method, the options and the initial guess for an interval.
 pub(crate) struct IntervalScheme<'a, M: Dae, E: Lanes, const S: usize> {
     pub coefficients: &'a Coefficients<E, S>,
     pub options: &'a Options,
@@ -25,15 +25,15 @@ pub(crate) struct IntervalScheme<'a, M: Dae, E: Lanes, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// What comes before the first step of a call.
+    /// Prepares the first step of a call.
     pub(crate) fn begin_call(&mut self) {
         self.place_inputs();
-        // The same input gives the same bits in every call: nothing of the last one is taken over.
+        // Discards the factors of the last call, so that results are bitwise reproducible.
         self.validity = Default::default();
         self.compensation.as_mut().fill(E::from_f64(0.0));
     }
 
-    /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
+    /// Computes `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
     pub(crate) fn advance(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -69,9 +69,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after`
-    /// is called with what is known about it, and whether the factors that are there are those of
-    /// its solution.
+    /// Integrates the interval: updates `x` from its start to its end. After each step calls
+    /// `after_step` with the step, and with whether the factors in the workspace are those at its
+    /// solution.
     ///
     /// # Errors
     /// Those of Newton's method; [`Error::Overflow`].
@@ -102,8 +102,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         Ok(())
     }
 
-    /// The stages of a step by the planned elimination, and where that does not arrive by the dense
-    /// fallback; whether the factors that are there are those of the solution.
+    /// Solves for the stages of a step by the planned elimination, or if that fails by the dense
+    /// fallback. Returns whether the factors in the workspace are those at the solution.
     fn solve(
         &mut self,
         scheme: &IntervalScheme<'_, M, T, S>,
@@ -144,21 +144,21 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         #[cfg(feature = "alloc")]
         let initial_y = *y;
         match self.newton_dense(coefficients, &options.newton, n, x, y, statistics) {
-            // Of the whole matrix, pivoted, it is asked again.
+            // The check is repeated with the pivoted factors of the whole matrix.
             Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
                 Some(unknown) => Err(singular_error::<M>(unknown, n)),
                 None => Ok(false),
             },
             Ok(()) => Ok(false),
-            // Start values that are solutions but for their last digits are taken for solutions
-            // where Newton's method leads away from them.
+            // Start values that are solutions up to rounding are accepted if Newton's method
+            // diverges from them.
             Err(_) if cfg!(feature = "alloc") && self.start_near_solution => {
                 self.set_initial_guess(coefficients, guess, n, None, y);
                 Ok(false)
             }
             Err(error) => {
                 if n == 0 {
-                    return Err(self.explain_start(error, guess));
+                    return Err(self.explain_first_step(error, guess));
                 }
                 #[cfg(feature = "alloc")]
                 let error = self.explain_fold(error, coefficients, (n, x), &initial_y, y);
@@ -167,8 +167,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         }
     }
 
-    /// The linearisation at the solution of a step, `exact` if the factors that are there are its
-    /// own.
+    /// Linearises a step at its solution; `factors_at_solution` is whether the workspace has its
+    /// factors already.
     ///
     /// # Errors
     /// A value of the model that is not finite, a singular matrix.
@@ -190,8 +190,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// The linearisation at the solution of a step, by the plan if there is one; its factors in
-    /// `to` another place, if it is given.
+    /// Linearises a step at its solution, with the planned elimination if there is a plan; writes
+    /// the factors to `to`, if given.
     pub(crate) fn linearize_planned(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -222,12 +222,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     }
 }
 
-/// The equations of a step do not determine an unknown.
+/// The error of equations that do not determine an unknown.
 fn singular_error<M: Dae>(unknown: usize, step: usize) -> Error {
     Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
 }
 
-/// Algebraic states at a point of the polynomial through the stages.
+/// Evaluates algebraic states at a point of the polynomial through the stages.
 pub(crate) fn interpolate_algebraic<M: Dae, E: Lanes, const S: usize>(
     z: &mut [E],
     y: &ArrayK<M, [E; S]>,

@@ -1,4 +1,4 @@
-//! What is remembered about steps, and the memory that all calls work in.
+//! The data of steps, and the workspace of all calls.
 
 use super::stage_array::StageArray;
 use crate::linalg::{Factors, SharedFactors};
@@ -9,17 +9,17 @@ use crate::scalar::{Lanes, Strided};
 use crate::shape::{Aligned, Plain, copy, copy_into};
 use bytemuck::Zeroable;
 
-/// One step: all that is needed to find out anything else about it.
+/// One step: its start and its stages determine everything else.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Step<M: Dae, T: Plain, const S: usize> {
-    /// The state at its start.
+    /// State at the start of the step.
     pub(crate) x: ArrayX<M, T>,
-    /// The unknowns `(k, z)` at its stages.
+    /// The unknowns `(k, z)` at the stages.
     pub(crate) y: Aligned<ArrayK<M, [T; S]>>,
 }
 
-/// What a call was given, besides the state at its start.
+/// The inputs of a call besides the initial state.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct Inputs<M: Dae, T: Plain> {
@@ -28,14 +28,14 @@ pub(crate) struct Inputs<M: Dae, T: Plain> {
     pub time: IntervalTimes<T>,
 }
 
-/// Where an interval is.
+/// The times of an interval.
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct IntervalTimes<T> {
-    /// Its start.
+    /// Start of the interval.
     pub start: T,
-    /// Its length.
+    /// Length of the interval.
     pub interval: T,
-    /// The length of one of its steps.
+    /// Length of a step.
     pub step: T,
 }
 
@@ -49,70 +49,70 @@ pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = 
     pub factors: Factors<M, T, S, F>,
 }
 
-/// The memory that every call works in.
+/// The workspace of all calls.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct StageWorkspace<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
-    /// The solution of the last call.
+    /// Solution of the last call.
     pub(crate) result: Nominal<M, T>,
-    /// The solution at the last time that was asked for.
+    /// Result of the last dense output.
     pub(crate) dense_output: Dense<M, T>,
-    /// What the last call was given.
+    /// Inputs of the last call.
     pub(crate) inputs: Inputs<M, T>,
-    /// What the last successful call was given.
+    /// Inputs of the last successful call.
     pub(crate) last_inputs: Inputs<M, T>,
-    /// Parameters as they were set.
+    /// Parameters set by the user.
     pub(crate) parameters: VectorP<M, T>,
-    /// Start values as they were given.
+    /// Start values set by the user.
     pub(crate) start_values: ArrayK<M, T>,
-    /// The state at the start of the step, then at its end.
+    /// State at the start of the step, then at its end.
     pub(crate) x: ArrayX<M, T>,
-    /// What was rounded off from it, if sums are compensated.
+    /// Compensation of `x`, if sums are compensated.
     pub(crate) compensation: ArrayX<M, T>,
-    /// Variables of the model, each at all stages.
+    /// Variables of the model at all stages.
     pub(crate) points: Aligned<StageArray<ArrayV<M, [T; S]>, T, S>>,
     /// The residual at all stages.
     pub(crate) f: Aligned<StageArray<ArrayK<M, [T; S]>, T, S>>,
     /// The residual in the slots of the equations, then the increment.
     pub(crate) increment: Aligned<ArrayK<M, [[T; 1]; S]>>,
-    /// Reciprocals of the sizes of the unknowns, which increments are measured by.
+    /// Reciprocal sizes of the unknowns, the weights of increments.
     pub(crate) weights: ArrayK<M, T>,
-    /// The sizes of the last increments.
+    /// Sizes of the last increments.
     pub(crate) increment_sizes: ArrayK<M, T>,
     pub(crate) linearization: Linearization<M, T, S, F>,
-    /// Factors of the shared Jacobian of the stages, which iterations take where that is cheaper.
+    /// Factors of the shared Jacobian.
     pub(crate) shared: F::Place<SharedFactors<M, T, S>>,
-    /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While
-    /// stages are solved with compensated sums, what they are beyond their digits.
+    /// Scratch memory: sums and magnitudes of backward errors; compensation of the stages while
+    /// they are solved with compensated sums.
     pub(crate) variable_scratch: [Aligned<ArrayV<M, [T; S]>>; 2],
     pub(crate) equation_magnitudes: Aligned<ArrayK<M, [T; S]>>,
-    /// What the factors that are there are good for.
+    /// Validity of the available factors.
     pub(crate) validity: FactorValidity,
-    /// Whether the constant entries of the Jacobian are there.
+    /// Whether the constant entries of the Jacobian are written.
     pub(crate) constants_written: bool,
-    /// Whether start values are solutions but for their last digits.
+    /// Whether start values are solutions up to rounding.
     pub(crate) start_near_solution: bool,
-    /// Whether the model has the same values at all stages when it is evaluated next.
+    /// Whether the next evaluation of the model is at identical stages.
     pub(crate) identical_stages: bool,
-    /// Whether its Jacobian, the same at all stages, is there for the first one only.
+    /// Whether the Jacobian, equal at all stages, is written for the first stage only.
     pub(crate) first_stage_only: bool,
 }
 
-/// What factors that are there are good for.
+/// Validity of factors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Zeroable)]
 pub(crate) struct FactorValidity {
-    /// They belong to this call, and to its size of steps.
+    /// Whether the factors belong to this call and its step size.
     pub factors: bool,
-    /// Those of the shared Jacobian do.
+    /// Whether the factors of the shared Jacobian do.
     pub shared: bool,
-    /// How fast Newton's method converged with them, `θ`; zero if it is not known.
+    /// Contraction rate `θ` of Newton's method with them; zero if unknown.
     pub rate: f64,
 }
 
 copy!([M: Dae, T: Plain] Inputs<M, T>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
-    /// Copies what holds.
+    /// Copies the Jacobian and the factors.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         copy_into(&mut self.jacobian, &other.jacobian);
         self.factors.copy_from(&other.factors);
@@ -120,7 +120,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// The linearisation of a step that was remembered, or else the one that is here.
+    /// Returns the stored linearisation, or else that of the workspace.
     pub(crate) fn linearization<'a>(
         &'a self,
         stored_linearization: Option<&'a Linearization<M, E, S, F>>,
@@ -128,7 +128,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         stored_linearization.unwrap_or(&self.linearization)
     }
 
-    /// To be called before anything else.
+    /// Writes the constant entries of the Jacobian; must be called first.
     pub(crate) fn write_constants(&mut self) {
         if !self.constants_written {
             for stage in 0..S {

@@ -1,16 +1,15 @@
-//! Kernels on s×s blocks and on rows of s×C right-hand sides.
+//! Kernels for s×s blocks and for panel rows of s×W right-hand sides.
 //!
-//! Generic over the scalar, so that the same code serves one number and registers of them. Blocks
-//! lie column after column: a column is a vector over the stages, which is what one right-hand side
-//! wants.
+//! Generic over the scalar: the same code serves single numbers and SIMD registers. Blocks are
+//! stored by columns, which are vectors over the stages, for products with one right-hand side.
 
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
 
-/// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
+/// The stages of a slot in `W` columns of right-hand sides, in row-major order.
 pub type PanelRow<E, const S: usize, const W: usize> = [[E; W]; S];
 
-/// `−hA` of a tableau: what states at the stages have of the derivatives there, with another sign.
+/// `−hA` of a tableau: the negative derivatives of the stages `ξ` by the slopes `k`.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn minus_ha<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> {
     let mut block = [[h; S]; S];
@@ -95,8 +94,8 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
     });
 }
 
-/// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane,
-/// where any lane wants it. A singular block gives elements that are not finite.
+/// Returns the inverse by Gauss-Jordan elimination with partial pivoting. Rows are swapped for each
+/// lane separately. The inverse of a singular block is not finite.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
@@ -110,7 +109,7 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
     if const { size_of::<E>() > 8 && S > 2 && S <= MAX_STEPS } {
         return inverse_in_registers::<A, E, S>(block);
     }
-    // On the transposed matrix, so that what is done to rows is done to vectors of the memory.
+    // Eliminates the transposed matrix, so that row operations are vector operations in memory.
     let mut a = *block;
     let mut inverse = [[zero; S]; S];
     for (i, row) in inverse.iter_mut().enumerate() {
@@ -148,12 +147,11 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
     inverse
 }
 
-/// So many steps of an elimination can be written one after the other.
+/// Maximal number of elimination steps that are unrolled.
 const MAX_STEPS: usize = 4;
 
-/// The same in place: registers hold the block, but not the unit matrix beside it. The steps are
-/// written one after the other, or indices that the optimiser does not know would keep the block in
-/// the memory.
+/// Inverts in place: registers hold the block without a unit matrix. The steps are unrolled, since
+/// indices that the optimiser does not know would move the block to memory.
 #[inline(always)]
 fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let zero = E::from_f64(0.0);
@@ -168,7 +166,7 @@ fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E
     }
     const { assert!(MAX_STEPS == 4) };
     steps!(0 1 2 3);
-    // What was done to rows is undone to columns of the inverse.
+    // Row swaps of the block are column swaps of the inverse.
     if exchanged {
         for k in (0..S).rev() {
             for i in (k + 1..S).rev() {
@@ -183,7 +181,7 @@ fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E
     a
 }
 
-/// A step of it. Whether rows were exchanged.
+/// One elimination step; returns whether rows were swapped.
 #[inline(always)]
 // Loops over indices of a fixed number are unrolled more reliably.
 #[allow(clippy::needless_range_loop)]
@@ -204,7 +202,7 @@ fn eliminate<A: Arithmetic, E: Field, const S: usize>(
             }
         }
     }
-    // The column that is eliminated gives its place to one of the inverse.
+    // The eliminated column is replaced by a column of the inverse.
     let scale = a[k][k].reciprocal();
     for j in 0..S {
         a[k][j] = if j == k { scale } else { a[k][j] * scale };
@@ -226,11 +224,11 @@ mod tests {
     use crate::linalg::kernel::arithmetic::Unfused;
     use crate::linalg::transformed::complex::Complex;
 
-    /// Two complex numbers and a real one, each a system of its own.
+    /// Two complex numbers and a real one: three independent systems.
     type Three = Complex<f64, 5>;
 
-    /// Permutations, another one in each system, and a little of everything else: what is largest
-    /// is never where the others have it.
+    /// Perturbed permutation matrices, a different one in each system: the pivots of the systems
+    /// are in different rows.
     fn block<const S: usize>(seed: usize) -> Block<Three, S> {
         let wave = |k: usize| 0.05 * ((seed * 37 + k) as f64).sin();
         let mut block = [[Complex { parts: [0.0; 5] }; S]; S];
@@ -250,8 +248,8 @@ mod tests {
         block
     }
 
-    /// Blocks with conditions below two, in infinity norms: `S²` products and as many sums,
-    /// rounded, both ways.
+    /// Checks the inverses of blocks with condition numbers below two in the infinity norm. The
+    /// bound counts `S²` products and as many sums, for products from both sides.
     fn inverts<const S: usize>() {
         for seed in 0..8 * S {
             let block = block::<S>(seed);

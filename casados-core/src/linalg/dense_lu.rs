@@ -1,7 +1,7 @@
-//! `P A = L U` of the whole matrix, with partial pivoting: the way that needs no plan.
+//! `P A = L U` of the whole matrix with partial pivoting, for the dense fallback.
 //!
-//! It is seldom taken. What it computes are loops over slices, which are compiled once for all
-//! models and numbers of stages of a program, and are not unrolled.
+//! It is executed rarely: its loops over slices are compiled once for all models and numbers of
+//! stages of a program, and are not unrolled.
 
 use super::kernel::vector::{axpy, divide};
 use crate::model::{ArrayK, Dae};
@@ -9,15 +9,16 @@ use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Plain, copy};
 use bytemuck::Zeroable;
 
-/// A matrix over the unknowns of all stages, and after [`Dense::factor`] its factors.
+/// A matrix over the unknowns of all stages; after [`DenseLu::factor`] its factors.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct DenseLu<M: Dae, T: Plain, const S: usize> {
-    /// Rows of `A`, then of `L` (its diagonal is one and not stored) and `U`.
+    /// Rows of `A`; after the factorisation those of `L` (with a unit diagonal, which is not
+    /// stored) and `U`.
     rows: ArrayK<M, [ArrayK<M, [T; S]>; S]>,
-    /// The row that was exchanged with row `k` in step `k`.
+    /// The row that was swapped with row `k` in step `k`.
     pivots: ArrayK<M, [u32; S]>,
-    /// What each row is multiplied by: 1 / its largest element, in the order of the pivots.
+    /// Scaling factors of the rows, 1 / largest element, in pivot order.
     scales: ArrayK<M, [T; S]>,
 }
 
@@ -31,7 +32,7 @@ impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
         }
     }
 
-    /// Adds a value that couples an equation with an unknown of the same stage.
+    /// Adds an entry of an equation and an unknown at the same stage.
     #[inline(always)]
     pub fn add(&mut self, equation: usize, unknown: usize, stage: usize, value: T) {
         if let Some(block) = self.block(equation, unknown, stage)
@@ -41,8 +42,7 @@ impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
         }
     }
 
-    /// Adds values that couple an equation at one stage with an unknown at all stages:
-    /// `factor · row`.
+    /// Adds entries of an equation at one stage and an unknown at all stages: `factor · row`.
     #[inline(always)]
     pub fn add_row(&mut self, equation: usize, unknown: usize, stage: usize, factor: T, row: &[T; S]) {
         if let Some(block) = self.block(equation, unknown, stage) {
@@ -50,7 +50,7 @@ impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
         }
     }
 
-    /// What couples an equation at one stage with an unknown at all stages.
+    /// The entries of an equation at one stage and an unknown at all stages.
     #[inline(always)]
     fn block(&mut self, equation: usize, unknown: usize, stage: usize) -> Option<&mut [T; S]> {
         self.rows.as_mut().get_mut(equation)?.get_mut(stage)?.as_mut().get_mut(unknown)
@@ -59,7 +59,7 @@ impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
     /// Replaces the matrix by its factors; see [`factor`].
     ///
     /// # Errors
-    /// The column `(unknown, stage)` that has no pivot.
+    /// The column `(unknown, stage)` without a pivot.
     pub fn factor(&mut self) -> Result<(), (usize, usize)> {
         let rows = Array::flat_mut(self.rows.as_mut().as_flattened_mut()).as_flattened_mut();
         let (pivots, scales) = (self.pivots.as_mut(), self.scales.as_mut());
@@ -87,14 +87,14 @@ impl<M: Dae, E: Lanes, const S: usize> DenseLu<M, E, S> {
     }
 }
 
-/// Replaces a matrix, its rows one after the other, by its factors.
+/// Replaces a matrix in row-major order by its factors.
 ///
-/// Pivots are compared relative to the largest element of their row, so that the choice does not
-/// depend on the scaling of equations. A pivot is zero if it is not larger than the rounding errors
-/// that it carries, `n ε Σ_j |l_ij u_jk|`, whatever the scaling of equations and unknowns.
+/// Pivots are compared relative to the largest element of their row, so that the choice is
+/// invariant under scaling of equations. A pivot counts as zero if it does not exceed its rounding
+/// errors, `n ε Σ_j |l_ij u_jk|`, which is invariant under scaling of equations and unknowns.
 ///
 /// # Errors
-/// The column that has no pivot.
+/// The column without a pivot.
 #[inline(never)]
 fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Result<(), usize> {
     let n = scales.len();
@@ -144,8 +144,8 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
     Ok(())
 }
 
-/// Two rows of so many elements in each other's place. The compiler does not know that pivots are
-/// rows.
+/// Swaps two rows of `width` elements. The bounds check remains, since the compiler cannot prove
+/// that pivots are rows.
 fn swap_rows<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
     let (first, second) = (i.min(j), i.max(j));
     if first == second {
@@ -158,7 +158,7 @@ fn swap_rows<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
     }
 }
 
-/// Factors, and the order and the scale of the rows that they are of.
+/// The factors, with the pivot order and the scaling of the rows.
 struct LuFactors<'a, E> {
     rows: &'a [E],
     pivots: &'a [u32],
@@ -166,7 +166,7 @@ struct LuFactors<'a, E> {
 }
 
 impl<E: Lanes> LuFactors<'_, E> {
-    /// `A X = B` with `width` columns.
+    /// Solves `A X = B` with `width` columns.
     #[inline(never)]
     fn solve(&self, b: &mut [E], width: usize) {
         let (n, zero) = (self.scales.len(), E::from_f64(0.0));
@@ -202,7 +202,7 @@ impl<E: Lanes> LuFactors<'_, E> {
         }
     }
 
-    /// Multiplies the rows, which are not empty, as those of the matrix were.
+    /// Scales the rows of `b`, which are not empty, by the factors of the matrix.
     #[inline(always)]
     fn scale(&self, b: &mut [E], width: usize) {
         for (row, scale) in b.chunks_exact_mut(width).zip(self.scales) {
@@ -212,7 +212,7 @@ impl<E: Lanes> LuFactors<'_, E> {
         }
     }
 
-    /// `Aᵀ X = B` with `width` columns.
+    /// Solves `Aᵀ X = B` with `width` columns.
     #[inline(never)]
     fn solve_transposed(&self, b: &mut [E], width: usize) {
         let (n, zero) = (self.scales.len(), E::from_f64(0.0));

@@ -1,20 +1,20 @@
 //! The linear systems of the stages.
 //!
 //! Unknowns are ordered by variable, stages innermost: `(k₀₁ … k₀ₛ, k₁₁ … k₁ₛ, …)`. The Newton
-//! matrix then is a matrix of `S × S` blocks with the pattern of the model. Right-hand sides have
-//! one row per slot, all columns side by side; [`slot`] tells where the row of an equation is.
+//! matrix then consists of `S × S` blocks with the sparsity pattern of the model. Right-hand sides
+//! have one row per slot, with all columns adjacent; [`slot`] returns the row of an equation.
 //!
-//! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed
-//! (`newton_matrix`). They are found by the plan of the model (`sparse_lu`), and by pivoting the
-//! whole matrix (`dense_lu`) where that one is not good enough.
-//! [Kinematic](crate::model::Kinematic) states have slots, but neither pivots nor blocks: what is
-//! there stays there. Stages that share one Jacobian have smaller systems in the eigenbasis of the
-//! tableau (`transformed`). `kernel` is what all of this is compiled with, `block` arithmetic of
-//! `S × S` blocks.
+//! [`Factors`] is the interface for the rest of the library: factor, solve, solve transposed
+//! (`newton_matrix`). The factors are computed by the plan of the model (`sparse_lu`), or with
+//! pivoting of the whole matrix (`dense_lu`) if those are too inaccurate.
+//! [Kinematic](crate::model::Kinematic) states have slots, but neither pivots nor blocks: their
+//! rows remain unchanged. Stages that share one Jacobian have smaller systems in the eigenbasis of
+//! the tableau (`transformed`). `kernel` compiles kernels and unrolls loops, `block` is the
+//! arithmetic of `S × S` blocks.
 //!
-//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions.
-//! Without optimisation helpers that know nothing of a model are functions like others: inlined
-//! they would be no faster, and compiled once more for each kernel of each model.
+//! Everything in a kernel is inlined, so that it is compiled for the machine's instructions.
+//! Without optimisation, helpers that do not depend on a model are ordinary functions: inlined they
+//! would be no faster, and compiled again for each kernel of each model.
 
 mod block;
 mod dense_lu;

@@ -15,13 +15,13 @@ use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Aligned, Array, Plain, Shape, copy_into};
 use bytemuck::Zeroable;
 
-/// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
+/// Returns the row of an equation in right-hand sides: that of the unknown whose pivot it is.
 #[inline(always)]
 pub fn slot<M: Dae>(equation: usize) -> usize {
     Known::<M>::PLAN.slot(equation)
 }
 
-/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+/// Returns the kinematic state of a slot, if it is [kinematic](Kinematic).
 #[inline(always)]
 pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
     plan::kinematic(&M::STRUCTURE, slot)
@@ -32,19 +32,19 @@ pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
 #[zeroable(bound = "")]
 pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     blocks: Aligned<M::Factors<Block<T, S>>>,
-    /// Memory that is touched only where the plan is not good enough.
+    /// Memory of the dense fallback, untouched while the plan is accurate.
     dense: F::Place<DenseLu<M, T, S>>,
-    /// Whether the dense factors are the ones that hold.
+    /// Whether the dense factors are the current ones.
     is_dense: bool,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
-    /// Whether the whole matrix may be pivoted: not in registers, of which a lane that needs it is
-    /// computed alone.
+    /// Whether the whole matrix may be pivoted: for scalars only. An interval in a SIMD lane that
+    /// needs it is recomputed alone.
     pub const MAY_BE_DENSE: bool = E::LANES == 1;
 
-    /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all
-    /// stages. A pivot that vanishes leaves elements that are not finite.
+    /// Factorises by the plan, from the Jacobian entries at all stages. A vanishing pivot gives
+    /// factors that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let blocks = &mut self.blocks;
@@ -54,8 +54,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         factor::factor(plan, blocks.as_mut());
     }
 
-    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of
-    /// kinematic states stay.
+    /// Solves `J X = B` in place for all columns of `B`; equations are in their slots. Rows of
+    /// kinematic states remain unchanged.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) if const { Self::MAY_BE_DENSE } => dense.solve(b),
@@ -63,8 +63,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
     }
 
-    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their
-    /// slots. Rows of kinematic states stay.
+    /// Solves `Jᵀ X = B` in place for all columns of `B`; the solution has equations in their
+    /// slots. Rows of kinematic states remain unchanged.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) if const { Self::MAY_BE_DENSE } => dense.solve_transposed(b),
@@ -72,23 +72,23 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
     }
 
-    /// The factors by the plan.
+    /// Returns the factors by the plan.
     pub fn planned(&self) -> PlannedFactors<'_, F::Plan<M>, E, S> {
         PlannedFactors { plan: F::plan::<M>(), blocks: self.blocks.as_ref() }
     }
 
-    /// Whether the factors that are there are those of the plan.
+    /// Whether the current factors are those of the plan.
     pub fn is_from_plan(&self) -> bool {
         !Self::MAY_BE_DENSE || self.dense().is_none()
     }
 
-    /// The factors of the whole matrix, if they are the ones that hold.
+    /// Returns the factors of the whole matrix, if they are the current ones.
     #[inline(always)]
     fn dense(&self) -> Option<&DenseLu<M, E, S>> {
         self.dense.get().filter(|_| self.is_dense)
     }
 
-    /// Copies what holds.
+    /// Copies the current factors.
     pub fn copy_from(&mut self, other: &Self) {
         self.is_dense = other.is_dense;
         if let (Some(to), Some(from)) = (self.dense.get_mut(), other.dense()) {
@@ -99,7 +99,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 }
 
-/// All blocks of the Newton matrix, each written once.
+/// Assembles all blocks of the Newton matrix, each written once.
 struct Assemble<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
@@ -156,7 +156,7 @@ impl<M: Plan, E: Field + Plain, const S: usize> RowVisitor for AssemblyRows<'_, 
         }
         let Some(to) = blocks.get_mut(entry.block as usize) else { return };
         let mut block = if entry.first { [[E::from_f64(0.0); S]; S] } else { *to };
-        // An index that marks what is not there lies outside of the Jacobian.
+        // Absent entries have an index outside of the Jacobian.
         if let Some(&(mut values)) = jacobian.get(entry.entry as usize) {
             if let Some(minus_c) = jacobian.get(entry.by as usize) {
                 for value in &mut values {
@@ -176,7 +176,7 @@ impl<M: Plan, E: Field + Plain, const S: usize> RowVisitor for AssemblyRows<'_, 
         }
         *to = block;
     }
-    /// Fill.
+    /// Clears a block of fill-in.
     #[inline(always)]
     fn visit_simple(&mut self, row: usize) {
         factor::clear_fill::<M, E, _>(self.plan, self.blocks, row, [[E::from_f64(0.0); S]; S]);
@@ -184,10 +184,10 @@ impl<M: Plan, E: Field + Plain, const S: usize> RowVisitor for AssemblyRows<'_, 
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
-    /// By pivoting the whole matrix, with the row of each equation in its slot.
+    /// Factorises with pivoting of the whole matrix; the row of each equation is in its slot.
     ///
     /// # Errors
-    /// The unknown and the stage for which there is no pivot; nothing if there is no memory for it.
+    /// The unknown and the stage without a pivot; `None` if there is no memory for the matrix.
     pub fn factor_dense(
         &mut self,
         jacobian: &M::Jacobian<[T; S]>,
@@ -210,14 +210,14 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
             let c = minus_c.and_then(|minus_c| minus_c.first()).map_or(T::ONE, |&minus_c| -minus_c);
             for (stage, &value) in values.iter().enumerate() {
                 let (r, column, value) = (place.slot, place.column, c * value);
-                match place.order {
+                match place.ha_power {
                     0 => dense.add(r, column, stage, value),
                     1 => dense.add_row(r, column, stage, h * value, &a[stage]),
                     _ => dense.add_row(r, column, stage, h * h * value, &square[stage]),
                 }
             }
         });
-        // Their rows stay.
+        // Rows of kinematic states are those of the unit matrix.
         for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
             (0..S).for_each(|stage| dense.add(state, state, stage, T::ONE));
         }
@@ -225,19 +225,19 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
     }
 }
 
-/// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing
-/// in their columns.
+/// The position of an entry of the Jacobian in the whole matrix, which has rows for kinematic
+/// states, but no entries in their columns.
 pub struct DenseEntry {
     /// The row.
     pub slot: usize,
     /// The unknown.
     pub column: usize,
-    /// It multiplies so many factors `hA`.
-    pub order: u32,
+    /// Power of `hA` that the entry is multiplied by.
+    pub ha_power: u32,
 }
 
-/// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with
-/// `−c` if it belongs to such a state.
+/// Visits the entries of `f_ẋ`, `f_x` and `f_z`, except those in equations of kinematic states;
+/// with `−c` for an entry of a kinematic state.
 pub fn for_each_dense_entry<M: Dae, V: Copy>(
     jacobian: &[V],
     mut visit: impl FnMut(DenseEntry, &V, Option<&V>),
@@ -252,9 +252,9 @@ pub fn for_each_dense_entry<M: Dae, V: Copy>(
         let (column, order) =
             (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
         match kinematic::<M>(column) {
-            None => visit(DenseEntry { slot, column, order }, values, None),
+            None => visit(DenseEntry { slot, column, ha_power: order }, values, None),
             Some(of) if (of.velocity as usize) < 2 * nx => {
-                let place = DenseEntry { slot, column: of.velocity as usize - nx, order: order + 1 };
+                let place = DenseEntry { slot, column: of.velocity as usize - nx, ha_power: order + 1 };
                 visit(place, values, jacobian.get(of.entry as usize));
             }
             Some(_) => {}

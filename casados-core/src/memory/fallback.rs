@@ -1,4 +1,4 @@
-//! What an implicit integrator does where the planned elimination is not good enough.
+//! The fallback of implicit integrators if the planned elimination is too inaccurate.
 
 use super::{Absent, Inside, Stored, sealed};
 use crate::model::Dae;
@@ -6,8 +6,8 @@ use crate::model::Dae;
 use crate::plan::ModelTable;
 use crate::plan::{Known, PlanOf};
 
-/// It pivots the whole matrix. With three stages or more it has memory for the shared Jacobian of
-/// the stages too, which Newton's method takes where iterations are not fixed.
+/// Pivots the whole matrix. With three stages or more, its memory also holds the factors of the
+/// shared Jacobian, which Newton's method uses unless the number of iterations is fixed.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -22,9 +22,9 @@ use crate::plan::{Known, PlanOf};
 #[derive(Clone, Copy, Debug)]
 pub struct Pivoting;
 
-/// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no
-/// other worst case than the usual one. Neither the whole matrix nor the shared Jacobian of the
-/// stages has any memory or any code: for firmware with fixed iterations.
+/// Returns [`Error::NotPivoted`](crate::Error::NotPivoted), so that the worst case of the time of a
+/// call is the usual case. There is no memory and no code for the whole matrix or the shared
+/// Jacobian: for firmware with fixed iterations.
 ///
 /// ```
 /// # use casados_core::{Dae, Error, Gauss, Inline, Irk, memory::fallback, mode};
@@ -37,42 +37,42 @@ pub struct Pivoting;
 #[derive(Clone, Copy, Debug)]
 pub struct Refusing;
 
-/// [`Pivoting`], in an integrator of one step with the options that are those by default: it has no
-/// code for other steps and options.
+/// [`Pivoting`], for integrators of one step with default options: there is no code for other
+/// numbers of steps or options.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OneStep;
 
-/// [`Pivoting`], by kernels whose plans are bound when they run: they are compiled once for all
+/// [`Pivoting`], with kernels that take their plans at run time and are compiled once for all
 /// models ([`Shared`](super::Shared)).
 #[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug)]
 pub struct RunTime;
 
-/// [`Pivoting`], [`Refusing`] or `RunTime`.
+/// The fallback: [`Pivoting`], [`Refusing`] or `RunTime`.
 pub trait Fallback: sealed::Sealed + 'static {
-    /// A place for what only the fallback needs.
+    /// Memory of the fallback.
     type Place<V: Stored>: OptionalPlace<V>;
-    /// Whether there is one.
+    /// Whether there is such memory.
     const HAS_MEMORY: bool;
-    /// What kernels know of a model.
+    /// The plan type of kernels.
     type Plan<M: Dae>: PlanOf<M>;
-    /// The plan of a model.
+    /// Returns the plan of a model.
     fn plan<M: Dae>() -> Self::Plan<M>;
-    /// Whether intervals may have several steps, and any options.
+    /// Whether intervals may have several steps, with any options.
     #[doc(hidden)]
     const INTERVALS: bool = true;
 }
 
-/// A place that has a value, or has none.
+/// Memory with or without a value.
 pub trait OptionalPlace<V>: Stored {
-    /// The value.
+    /// Returns the value.
     fn get(&self) -> Option<&V>;
-    /// The value, to be written.
+    /// Returns the value for writing.
     fn get_mut(&mut self) -> Option<&mut V>;
 }
 
-/// Plans that are known when kernels are compiled.
+/// Plans that are known at compile time.
 macro_rules! known {
     () => {
         type Plan<M: Dae> = Known<M>;

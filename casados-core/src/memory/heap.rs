@@ -1,4 +1,4 @@
-//! Memory on the heap: each place is allocated, zeroed, when it is needed first.
+//! Memory on the heap, allocated and zeroed at its first use.
 
 use super::{
     Fallback, Family, Memory, Stored, WithAdjoint, WithDirectional, WithForward, WithHessian, fallback,
@@ -12,8 +12,7 @@ use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
 use core::any::Any;
 use core::marker::PhantomData;
 
-/// Memory on the heap: allocated when it is needed first; with what an implicit integrator is to
-/// fall back on ([`fallback`]).
+/// Memory on the heap, allocated at its first use, with the [`fallback`] of implicit integrators.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -35,12 +34,12 @@ use core::marker::PhantomData;
 #[derive(Clone, Copy, Debug)]
 pub struct Heap<F = fallback::Pivoting>(PhantomData<fn() -> F>);
 
-/// Memory on the heap for an integrator whose kernels are shared by all models: they take the
-/// structure of the model when they run. A program compiles them once for each method and number
-/// type, and not once more for each model; loops over the structure are not unrolled, so that a
-/// call takes longer. Results are those of [`Heap`] but for rounding errors, and so are errors.
+/// Memory on the heap for integrators whose kernels are shared by all models: kernels read the
+/// structure of the model at run time. A program compiles them once for each method and number
+/// type, instead of once for each model. Loops over the structure are not unrolled, so that calls
+/// take longer. Results and errors are those of [`Heap`] up to rounding.
 ///
-/// It is meant for debug builds and tests, and for programs with many models; see the chapter on
+/// It is intended for debug builds and tests, and for programs with many models; see the chapter on
 /// performance of the guide.
 ///
 /// ```
@@ -67,8 +66,7 @@ pub struct Allocated<V>(Option<Box<V>>);
 #[derive(Debug)]
 pub struct AllocatedTape<V>(Option<Box<[V]>>);
 
-/// Values on the heap, one of each type that was asked for: types differ in the number of
-/// seeds.
+/// Values on the heap, one of each requested type: types differ in the number of seeds.
 #[derive(Debug, Default)]
 pub struct AllocatedByType(Vec<Box<dyn Any + Send + Sync>>);
 
@@ -83,19 +81,19 @@ impl<V> Default for AllocatedTape<V> {
     }
 }
 
-/// A value whose bytes are zero.
+/// Allocates a value whose bytes are zero.
 pub(crate) fn allocate<V: Zeroable>() -> Result<Box<V>, Error> {
     try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<V>() })
 }
 
-/// One more element of a list.
+/// Appends an element to a list.
 pub(crate) fn push<V>(list: &mut Vec<V>, value: V) -> Result<(), Error> {
     list.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of::<V>() })?;
     list.push(value);
     Ok(())
 }
 
-/// More elements of a list.
+/// Appends elements to a list.
 pub(crate) fn extend<V: Copy>(list: &mut Vec<V>, values: &[V]) -> Result<(), Error> {
     list.try_reserve(values.len()).map_err(|_| Error::OutOfMemory { bytes: size_of_val(values) })?;
     list.extend_from_slice(values);
@@ -112,7 +110,7 @@ impl<V: Stored> Allocated<V> {
 }
 
 impl<V> Allocated<V> {
-    /// The value, if it was needed before.
+    /// Returns the value, if it was allocated.
     pub(crate) fn get(&self) -> Option<&V> {
         self.0.as_deref()
     }

@@ -1,4 +1,4 @@
-//! What the memory of an [`Inline`](super::Inline) integrator is for. Every mode contains `solve`.
+//! Modes of the memory of [`Inline`](super::Inline) integrators. Every mode includes `solve`.
 
 /// `solve`
 ///
@@ -68,7 +68,7 @@ pub struct Directional<const C: usize>;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Adjoint<const C: usize = 1>;
-/// `hessian` and all that `Forward` has
+/// `hessian` and everything in `Forward`
 ///
 /// ```
 /// # use casados::prelude::*;

@@ -11,22 +11,21 @@
 //! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`ConvexCost`] `φ(y − r)`, [`GeneralCost`], pairs of costs; integrals with [`WithIntegral`] |
 //! | `g` | [`Constraint`], pairs of constraints |
 //!
-//! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not
-//! written by anybody. [`Problem`] puts them together, `problem.on(horizon)` gives them memory: an
-//! [`Ocp`], which knows bounds by the names of the model (`ocp.bound("u", .., -1.0, 1.0)?`),
-//! references and parameters of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves
-//! it:
+//! All of these are `#[function]`s of the arguments of the model, with exact derivatives by the
+//! macro. [`Problem`] combines them, `problem.on(horizon)` allocates their memory: an [`Ocp`] has
+//! bounds by the names of the model (`ocp.bound("u", .., -1.0, 1.0)?`), references and parameters
+//! of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves it:
 //!
 //! ```text
 //! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        Exact, the default: all of it, regularised where a QP is not convex; GaussNewton: JᵀWJ of least squares alone
 //! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
 //! ```
 //!
-//! with line searches (merit function, filter, second-order correction) or full steps, penalties
-//! where a QP is infeasible (elastic mode), and an [`Outcome`] that says how it ended, at which
-//! constraint if there is one to blame. [`RealTime`] takes one step in each sample, in two phases.
+//! It uses a line search (merit function, filter, second-order correction) or full steps, and
+//! elastic mode where a QP is infeasible. Its [`Outcome`] has the status, and the constraint that
+//! prevents a solution, if there is one. [`RealTime`] takes one step in each sample, in two phases.
 //! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
-//! gains; `SolutionFactors` has adjoint ones, and gradient and Hessian of the optimal value.
+//! gains; `SolutionFactors` has adjoint derivatives, and gradient and Hessian of the optimal value.
 //! `BatchOcp` solves and differentiates many problems at once; `closed_loop` runs a controller and
 //! a plant.
 //!
@@ -51,31 +50,32 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its
-//! stages to there (`z0` of its results), with their exact first derivatives; those of second
-//! order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of
-//! the horizon there are none.
+//! Algebraic states `z_k` are those at the start of interval `k`, extrapolated there from the
+//! stages by the integrator (`z0` of its results), with exact first derivatives. Their second
+//! derivatives, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. The end
+//! of the horizon has no algebraic states.
 //!
-//! `Ocp::solution` has all of this by the names of the model, with multipliers, and
-//! `Ocp::dense_solution` points between the nodes too: a `Trajectory`, to be looked at, written and
-//! read.
+//! `Ocp::solution` returns a `Trajectory` with states, controls and multipliers by the names of the
+//! model, `Ocp::dense_solution` one with points between the nodes too. It can be read, written as
+//! CSV, and loaded again.
 //!
-//! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call,
-//! from the stages of the last one: these converge with the iterates, to the same solution.
+//! With [`Options::lifted`](crate::Options::lifted) an integrator takes one Newton iteration in
+//! each call, from the stages of the last call. The stages converge with the iterates, to the same
+//! solution.
 //!
-//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians.
-//! `Collocation` has stages as variables there: the same discrete solution, from guesses that
-//! nobody could integrate.
+//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians. With
+//! `Collocation` it has the stages as variables: the discrete solution is the same, and guesses
+//! need not be integrable.
 //!
 //! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
-//! (`ocp.shared("u.duration")?`). Parameters of the model are found by name
-//! (`ocp.free("p.mass", 0.1..=5.0, 1.0)?`), end times with [`Horizon::free`], and [`Boundary`] has
-//! conditions `r(x₀, x_N, p)` of any function. `Ocp::verify` says what a solution is worth between
+//! (`ocp.shared("u.duration")?`). Parameters of the model may be free
+//! (`ocp.free("p.mass", 0.1..=5.0, 1.0)?`), end times too ([`Horizon::free`]), and [`Boundary`]
+//! constrains any function `r(x₀, x_N, p)`. `Ocp::verify` estimates the error of a solution between
 //! its nodes.
 //!
-//! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose
-//! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
-//! are dynamics too.
+//! No heap is required: `problem.on_horizon(horizon, &DIMS, &mut memory)` uses memory whose length
+//! is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory are
+//! dynamics too.
 
 mod assembly;
 #[cfg(feature = "alloc")]

@@ -1,18 +1,18 @@
-//! From numbers to pixels, and the numbers that stand at an axis.
+//! Axes: the conversion of numbers to pixels, and the ticks.
 
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// One of both axes of a panel.
+/// An axis of a panel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Axis {
     pub label: String,
     pub is_log: bool,
-    /// What stands at 0, 1, 2, … in place of numbers.
+    /// Labels at 0, 1, 2, … that replace numbers.
     pub names: Vec<String>,
-    /// What is drawn, if it does not follow from the data.
+    /// The given range; by default it follows from the data.
     pub given: Option<(f64, f64)>,
 }
 
@@ -20,16 +20,16 @@ pub(super) struct Axis {
 #[derive(Clone, Debug)]
 pub(super) struct Scale {
     pub is_log: bool,
-    /// Numbers; exponents of ten on a logarithmic axis.
+    /// The ends of the range; exponents of ten on a logarithmic axis.
     pub low: f64,
     pub high: f64,
-    /// Pixels of both.
+    /// The pixels of both ends.
     pub from: f64,
     pub to: f64,
 }
 
 impl Axis {
-    /// About `count` numbers to be written, with their texts; or the names.
+    /// About `count` ticks with their texts; or the names.
     pub fn ticks(&self, scale: &Scale, count: usize) -> Vec<(f64, String)> {
         if self.names.is_empty() {
             return scale.ticks(count);
@@ -37,7 +37,7 @@ impl Axis {
         self.names.iter().enumerate().map(|(i, name)| (i as f64, name.clone())).collect()
     }
 
-    /// The scale over pixels `from..to`, of data.
+    /// The scale over the pixels `from..to` for the data.
     pub fn scale(&self, data: impl Iterator<Item = f64>, pixels: Range<f64>, room: f64) -> Scale {
         let place = |value: f64| if self.is_log { value.log10() } else { value };
         let (low, high) = match self.given {
@@ -47,7 +47,7 @@ impl Axis {
                     .map(place)
                     .filter(|value| value.is_finite())
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-                // Half of the length: the whole may be beyond the range of numbers.
+                // Half of the length: the whole may overflow.
                 let more = 2.0 * room * (0.5 * high - 0.5 * low);
                 match low <= high {
                     true => ((low - more).max(f64::MIN), (high + more).min(f64::MAX)),
@@ -60,7 +60,7 @@ impl Axis {
     }
 }
 
-/// A range with a length, whatever is given.
+/// A range of positive length, from any numbers.
 fn nonempty_range(low: f64, high: f64) -> (f64, f64) {
     if !(low.is_finite() && high.is_finite()) {
         return (0.0, 1.0);
@@ -75,14 +75,14 @@ fn nonempty_range(low: f64, high: f64) -> (f64, f64) {
 }
 
 impl Scale {
-    /// The pixel of a number; not finite if it has none.
+    /// The pixel of a number; not finite if the number has none.
     pub fn at(&self, value: f64) -> f64 {
         let value = if self.is_log { value.log10() } else { value };
         self.from + self.fraction_of_range(value) * (self.to - self.from)
     }
 
-    /// Where a number, or an exponent, lies between both ends: in halves, whose difference is a
-    /// number.
+    /// The position of a number, or an exponent, between both ends; halved, so that differences do
+    /// not overflow.
     fn fraction_of_range(&self, value: f64) -> f64 {
         (0.5 * value - 0.5 * self.low) / (0.5 * self.high - 0.5 * self.low)
     }
@@ -100,23 +100,23 @@ impl Scale {
         (-1e-9..=1.0 + 1e-9).contains(&self.fraction_of_range(value))
     }
 
-    /// Makes the range so long that a pixel is worth `unit`.
+    /// Extends the range so that a pixel corresponds to `unit`.
     pub fn widen(&mut self, unit: f64) {
         let (half, middle) = (0.5 * unit * (self.to - self.from).abs(), 0.5 * (self.low + self.high));
         (self.low, self.high) = ((middle - half).max(f64::MIN), (middle + half).min(f64::MAX));
     }
 
-    /// What a pixel is worth.
+    /// The length that corresponds to a pixel.
     pub fn unit(&self) -> f64 {
         (0.5 * self.high - 0.5 * self.low) / (0.5 * (self.to - self.from).abs().max(1.0))
     }
 
-    /// About `count` numbers to be written, with their texts.
+    /// About `count` ticks with their texts.
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         if !self.is_log {
             return ticks(self.low, self.high, count);
         }
-        // Exponents of numbers, of which the least ones are denormal.
+        // Exponents of numbers; the smallest are subnormal.
         let exponent = |value: f64| value.clamp(-323.0, 308.0) as i32;
         let (first, last) = (exponent(self.low.ceil()), exponent(self.high.floor()));
         let decades = last - first + 1;
@@ -138,7 +138,7 @@ impl Scale {
     }
 }
 
-/// A power of ten, also where it is denormal: `powi` divides by its inverse, which is infinite.
+/// A power of ten, also a subnormal one: `powi` divides by its inverse, which is infinite.
 fn power_of_ten(exponent: i32) -> f64 {
     if exponent < -300 { 10f64.powf(f64::from(exponent)) } else { 10f64.powi(exponent) }
 }
@@ -155,7 +155,7 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     let digits = (-step.log10() - 1e-9).ceil().clamp(0.0, 17.0) as usize;
     let largest = low.abs().max(high.abs());
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
-    // Numbers whose neighbours are the same have no ticks of their own.
+    // Numbers that equal their neighbours in floating point have no ticks.
     let all = (0..=(last - first).clamp(0.0, 100.0) as usize).map(|i| (first + i as f64) * step);
     let is_wide = !(1e-2..1e5).contains(&largest);
     let precision = (largest / step).log10().ceil().clamp(0.0, 17.0) as usize;
@@ -170,13 +170,13 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     .collect()
 }
 
-/// With three digits.
+/// A text with three digits.
 pub(super) fn three_digit_text(value: f64) -> String {
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
     fixed_point_text(if unit > 0.0 && unit.is_finite() { (value / unit).round() * unit } else { value })
 }
 
-/// With four digits behind the point at most.
+/// A text with at most four decimals.
 pub(super) fn fixed_point_text(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e5).contains(&value.abs()) {
         return scientific_text(value, 3);
@@ -185,7 +185,7 @@ pub(super) fn fixed_point_text(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// With a power of ten, and digits behind the point as far as they are not zero.
+/// A text with a power of ten, without trailing zeros.
 fn scientific_text(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -193,7 +193,7 @@ fn scientific_text(value: f64, digits: usize) -> String {
     format!("{short}e{exponent}")
 }
 
-/// A power of ten.
+/// The text of a power of ten.
 fn power_of_ten_text(exponent: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',
@@ -245,7 +245,7 @@ mod tests {
         let ticks = scale.ticks(4);
         assert_eq!(ticks.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>(), ["10⁻⁶", "10⁻³", "1"]);
         assert!((scale.at(1e-3) - 50.0).abs() < 1e-9);
-        // Zero and negative numbers have no place, and do not move the range.
+        // Zero and negative numbers have no position, and do not change the range.
         let scale = axis.scale([0.0, -1.0, 2.0, 6.0].into_iter(), 0.0..100.0, 0.0);
         assert_eq!(scale.ticks(4).iter().map(|(value, _)| *value).collect::<Vec<_>>(), [2.0, 5.0]);
         assert!(!scale.at(0.0).is_finite());

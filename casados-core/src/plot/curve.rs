@@ -1,10 +1,10 @@
-//! What is drawn in a panel: points, and how they look.
+//! Curves: points and their appearance in a panel.
 
 use super::svg::Colour;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Points that belong together. What is not finite interrupts a line.
+/// A curve or a set of dots. Points that are not finite interrupt a line.
 ///
 /// ```
 /// use casados::plot::{Curve, Panel};
@@ -16,18 +16,18 @@ use alloc::vec::Vec;
 pub struct Curve {
     pub(super) name: String,
     pub(super) points: Vec<(f64, f64)>,
-    /// What decides about colours, one for each point, or nothing.
+    /// The numbers that determine the colour of each point, if any.
     pub(super) values: Vec<f64>,
     pub(super) colour: Option<Colour>,
-    /// Of the line; zero if there is none.
+    /// The width of the line; zero for none.
     pub(super) width: f64,
     pub(super) dashed: bool,
-    /// Of dots; zero if there are none.
+    /// The radius of the dots; zero for none.
     pub(super) radius: f64,
 }
 
 impl Curve {
-    /// A line through points. A name stands in the legend; an empty one does not.
+    /// A line through points. The legend shows its name unless it is empty.
     #[must_use]
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Curve {
         }
     }
 
-    /// Stairs: each value is held until the next point.
+    /// Steps: each value is held until the next point.
     #[must_use]
     pub fn steps(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut curve = Self::line(name, []);
@@ -60,32 +60,32 @@ impl Curve {
         Self { width: 0.0, ..Self::line(name, points).marked() }
     }
 
-    /// A line through `(x, y)` whose colour is a third number; a bar beside the panel says which.
+    /// A line through `(x, y)` coloured by a third number; a bar beside the panel shows the scale.
     #[must_use]
     pub fn coloured(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let (points, values) = points.into_iter().map(|(x, y, value)| ((x, y), value)).unzip();
         Self { points, values, width: 4.0, ..Self::line(name, []) }
     }
 
-    /// Another colour than the next one of the palette.
+    /// Sets the colour; by default the next one of the palette.
     #[must_use]
     pub fn colour(self, colour: Colour) -> Self {
         Self { colour: Some(colour), ..self }
     }
 
-    /// The width of the line in pixels.
+    /// Sets the width of the line in pixels.
     #[must_use]
     pub fn width(self, width: f64) -> Self {
         Self { width, ..self }
     }
 
-    /// With dashes.
+    /// Draws the line dashed.
     #[must_use]
     pub fn dashed(self) -> Self {
         Self { dashed: true, ..self }
     }
 
-    /// With a dot at each point.
+    /// Adds a dot at each point.
     #[must_use]
     pub fn marked(self) -> Self {
         Self { radius: 3.0, ..self }

@@ -1,4 +1,4 @@
-//! Panels become shapes.
+//! Drawing of panels as shapes.
 
 use super::axis::{Scale, three_digit_text};
 use super::curve::Curve;
@@ -16,13 +16,13 @@ pub(super) struct Area {
     pub height: f64,
 }
 
-/// Pixels between two ticks, about.
+/// The approximate number of pixels between two ticks.
 const TICK_SPACING: [f64; 2] = [85.0, 32.0];
-/// Pixels of a row of the legend, and of the scale of colours.
+/// The height of a row of the legend, and the width of the colour bar, in pixels.
 const ROW: f64 = 18.0;
 const BAR: f64 = 84.0;
 const GAP: f64 = 8.0;
-/// Colours of a scale.
+/// The number of colours in a colour bar.
 const SHADES: usize = 32;
 
 impl Area {
@@ -36,7 +36,7 @@ impl Area {
     }
 }
 
-/// Names and colours of a legend in rows that are not wider than `room`.
+/// The names and colours of a legend in rows of at most `room` pixels.
 fn legend(series: &[(&Curve, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f64)>> {
     let mut rows: Vec<Vec<(String, Stroke, f64)>> = Vec::new();
     let mut right = f64::INFINITY;
@@ -58,13 +58,13 @@ fn legend(series: &[(&Curve, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f6
     rows
 }
 
-/// The least and the largest of what decides about colours.
+/// The range of the numbers that determine colours.
 pub(super) fn value_range<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
     let finite = values.copied().filter(|value| value.is_finite());
     finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
-/// A line whose colour changes: pieces of the same shade.
+/// Draws a line of varying colour in pieces of constant shade.
 pub(super) fn draw_coloured_line(
     canvas: &mut Canvas,
     points: &[Point],
@@ -89,7 +89,7 @@ pub(super) fn draw_coloured_line(
     }
 }
 
-/// The scale of colours at the right of an area.
+/// Draws the colour bar at the right of an area.
 pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high): (f64, f64)) {
     let (left, top, height) = (area.x + area.width + 14.0, area.y + 18.0, 0.7 * area.height);
     canvas.group("scale", name, |canvas| {
@@ -110,13 +110,13 @@ pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high
     });
 }
 
-/// Where what is in a panel, and how it is coloured.
+/// The layout of a panel, and its colours.
 struct Layout<'a> {
     coloured: Vec<(&'a Curve, Colour)>,
     legend: Vec<Vec<(String, Stroke, f64)>>,
-    /// The least and the largest of what decides about colours, if there is something.
+    /// The range of the numbers that determine colours, if any.
     values: Option<(f64, f64)>,
-    /// Of the legend's rows, and of the axes.
+    /// The top of the legend's rows, and of the axes.
     begin: f64,
     top: f64,
     bottom: f64,
@@ -145,7 +145,7 @@ impl Panel {
         Layout { coloured, legend, values, begin, top, bottom, right }
     }
 
-    /// Pixels at the left of the axes: what numbers and the label take.
+    /// The width of the tick texts and the label at the left of the axes, in pixels.
     pub(super) fn left(&self, area: Area) -> f64 {
         let Layout { top, bottom, right, .. } = self.layout(area);
         let inside = area.shrunk_by(0.0, top, right, bottom);
@@ -154,7 +154,7 @@ impl Panel {
         GAP + widest + 6.0 + if self.y.label.is_empty() { 0.0 } else { 20.0 }
     }
 
-    /// With room at the left, of which there may be more than is needed.
+    /// Draws the panel with a given width at the left, at least the required one.
     pub(super) fn draw(&self, canvas: &mut Canvas, area: Area, left: f64) {
         let layout = self.layout(area);
         let inside = area.shrunk_by(left, layout.top, layout.right, layout.bottom);
@@ -210,7 +210,7 @@ impl Panel {
         (x, y)
     }
 
-    /// Frame, lines of the grid, numbers and what they are.
+    /// Draws the frame, the grid, the ticks and the labels.
     fn draw_axes(&self, canvas: &mut Canvas, (border, inside): (f64, Area), [x, y]: [&Scale; 2]) {
         let (right, bottom) = (inside.x + inside.width, inside.y + inside.height);
         let grid = Stroke::new(Colour::GRID, 1.0);
@@ -232,7 +232,7 @@ impl Panel {
         });
     }
 
-    /// Strokes of one length, each from a dot on.
+    /// Draws strokes of equal length, each starting at a dot.
     fn draw_field(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2]) {
         const ARROW_SPACING: f64 = 22.0;
         let Some(field) = self.field else { return };

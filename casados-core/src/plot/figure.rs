@@ -1,4 +1,4 @@
-//! Panels on a page, and the page as text or file.
+//! Figures: panels on a page, as text or file.
 
 use super::draw::Area;
 use super::panel::Panel;
@@ -9,7 +9,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use std::path::Path;
 
-/// What a figure is made of: a [`Panel`], a [`Space`] or a [`Sparsity`].
+/// A part of a figure: a [`Panel`], a [`Space`] or a [`Sparsity`].
 ///
 /// ```
 /// # use casados::plot::{Cell, Figure, Panel};
@@ -46,10 +46,10 @@ impl From<Sparsity> for Cell {
     }
 }
 
-/// Panels side by side and below each other.
+/// Panels in columns.
 ///
-/// Columns are filled from the top, the first one first; all panels of a column have the same
-/// height.
+/// Columns are filled from top to bottom and from left to right; all panels of a column have the
+/// same height.
 ///
 /// ```
 /// use casados::plot::{Figure, Panel};
@@ -67,7 +67,7 @@ pub struct Figure {
     size: Option<(f64, f64)>,
 }
 
-/// Of a panel, where no size is given.
+/// The default size of a panel.
 const SIZE: (f64, f64) = (620.0, 320.0);
 const MARGIN: f64 = 8.0;
 
@@ -78,21 +78,21 @@ impl Figure {
         Self::default()
     }
 
-    /// Width and height in pixels. Without them each panel has 620 by 320.
+    /// Sets width and height in pixels. By default each panel has 620 by 320.
     #[must_use]
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((f64::from(width), f64::from(height)));
         self
     }
 
-    /// The next panels go into a new column, `share` times as wide as one of share 1.
+    /// Starts a new column, `share` times as wide as one of share 1.
     #[must_use]
     pub fn column(mut self, share: f64) -> Self {
         self.columns.push((if share > 0.0 && share.is_finite() { share } else { 1.0 }, Vec::new()));
         self
     }
 
-    /// A panel below the last one.
+    /// Adds a panel below the last one.
     #[must_use]
     pub fn with(mut self, cell: impl Into<Cell>) -> Self {
         if self.columns.is_empty() {
@@ -104,7 +104,7 @@ impl Figure {
         self
     }
 
-    /// Several panels below each other.
+    /// Adds several panels below each other.
     #[must_use]
     pub fn with_all<C: Into<Cell>>(self, cells: impl IntoIterator<Item = C>) -> Self {
         cells.into_iter().fold(self, Self::with)
@@ -123,7 +123,7 @@ impl Figure {
             let wide = (width - 2.0 * MARGIN) * share / shares;
             let high = (height - 2.0 * MARGIN) / cells.len().max(1) as f64;
             let area = |i: usize| Area { x, y: MARGIN + high * i as f64, width: wide, height: high };
-            // Axes of a column begin at the same place.
+            // The axes of a column are aligned.
             let left = (cells.iter().enumerate())
                 .map(|(i, cell)| if let Cell::Panel(panel) = cell { panel.left(area(i)) } else { 0.0 })
                 .fold(0.0, f64::max);
@@ -140,10 +140,10 @@ impl Figure {
         canvas.finish()
     }
 
-    /// Writes the figure to an SVG file; its folder is made if there is none.
+    /// Writes the figure to an SVG file, and creates its folder if necessary.
     ///
     /// # Errors
-    /// Those of the file, with its path.
+    /// Those of the file system, with the path.
     pub fn save(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
         let path = path.as_ref();
         let named = |error: std::io::Error| {

@@ -1,8 +1,8 @@
-//! Pictures: trajectories with their bounds, convergence, histograms of times, phase portraits,
-//! curves in three dimensions, matrices (feature `plot`).
+//! Figures: trajectories with their bounds, convergence, histograms of times, phase portraits,
+//! curves in three dimensions, sparsity patterns (feature `plot`).
 //!
-//! A [`Figure`] is made of [`Panel`]s, and becomes the text of an SVG file without any other crate.
-//! Lines, dots and groups have titles, which a browser shows under the pointer.
+//! A [`Figure`] consists of [`Panel`]s, and becomes the text of an SVG file without other crates.
+//! Lines, dots and groups have titles, which browsers show as tooltips.
 //!
 //! ```
 //! use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};

@@ -1,4 +1,4 @@
-//! A panel: two axes, and what is drawn over them.
+//! A panel: two axes and its curves.
 
 use super::axis::Axis;
 use super::curve::Curve;
@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// Two axes, and what is drawn over them.
+/// Two axes with curves.
 ///
 /// Ranges follow from the data unless they are given.
 ///
@@ -25,57 +25,57 @@ pub struct Panel {
     pub(super) y: Axis,
     pub(super) is_equal: bool,
     pub(super) series: Vec<Curve>,
-    /// Horizontal lines.
+    /// Horizontal limit lines.
     pub(super) limits: Vec<f64>,
     pub(super) texts: Vec<((f64, f64), String)>,
-    /// A field of directions.
+    /// A direction field.
     pub(super) field: Option<fn([f64; 2]) -> [f64; 2]>,
 }
 
 impl Panel {
-    /// A panel with a title and nothing else.
+    /// An empty panel with a title.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), ..Self::default() }
     }
 
-    /// Another title.
+    /// Sets the title.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// What stands below the horizontal axis.
+    /// Sets the label of the horizontal axis.
     #[must_use]
     pub fn x(mut self, label: impl Into<String>) -> Self {
         self.x.label = label.into();
         self
     }
 
-    /// What stands beside the vertical axis.
+    /// Sets the label of the vertical axis.
     #[must_use]
     pub fn y(mut self, label: impl Into<String>) -> Self {
         self.y.label = label.into();
         self
     }
 
-    /// From where to where the horizontal axis goes; what is outside is cut off.
+    /// Sets the range of the horizontal axis; curves are clipped to it.
     #[must_use]
     pub fn x_range(mut self, range: Range<f64>) -> Self {
         self.x.given = Some((range.start, range.end));
         self
     }
 
-    /// From where to where the vertical axis goes; what is outside is cut off.
+    /// Sets the range of the vertical axis; curves are clipped to it.
     #[must_use]
     pub fn y_range(mut self, range: Range<f64>) -> Self {
         self.y.given = Some((range.start, range.end));
         self
     }
 
-    /// Names in place of numbers below the horizontal axis: the first one at zero, the second at
-    /// one.
+    /// Replaces the numbers below the horizontal axis by names: the first one at zero, the second
+    /// at one.
     #[must_use]
     pub fn x_names<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
         self.x.names = names.into_iter().map(Into::into).collect();
@@ -83,28 +83,28 @@ impl Panel {
         self
     }
 
-    /// A logarithmic horizontal axis. Numbers that are not positive are left out.
+    /// Makes the horizontal axis logarithmic. Numbers that are not positive are omitted.
     #[must_use]
     pub fn log_x(mut self) -> Self {
         self.x.is_log = true;
         self
     }
 
-    /// A logarithmic vertical axis. Numbers that are not positive are left out.
+    /// Makes the vertical axis logarithmic. Numbers that are not positive are omitted.
     #[must_use]
     pub fn log_y(mut self) -> Self {
         self.y.is_log = true;
         self
     }
 
-    /// Both axes have the same scale: circles are round.
+    /// Gives both axes the same scale, so that circles are round.
     #[must_use]
     pub fn equal(mut self) -> Self {
         self.is_equal = true;
         self
     }
 
-    /// A curve, behind which later ones are drawn.
+    /// Adds a curve; later curves are drawn over it.
     #[must_use]
     pub fn with(mut self, curve: Curve) -> Self {
         self.series.push(curve);
@@ -139,13 +139,13 @@ impl Panel {
         self.with(Curve::coloured(name, points))
     }
 
-    /// The outline of a thing in the colour of ink: wings, a wall, an obstacle.
+    /// Adds the outline of an object in the colour of ink: wings, a wall, an obstacle.
     #[must_use]
     pub fn outline(self, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         self.with(Curve::line("", points).colour(Colour::INK))
     }
 
-    /// A thing that moves: its shape at one time after another, from light to dark.
+    /// Adds a moving object: its shapes at successive times, from light to dark.
     #[must_use]
     pub fn motion<S: IntoIterator<Item = (f64, f64)>>(mut self, shapes: impl IntoIterator<Item = S>) -> Self {
         let shapes: Vec<S> = shapes.into_iter().collect();
@@ -157,22 +157,22 @@ impl Panel {
         self
     }
 
-    /// A horizontal line: red and dashed.
+    /// Adds a horizontal limit: a red dashed line.
     #[must_use]
     pub fn limit(mut self, value: f64) -> Self {
         self.limits.push(value);
         self
     }
 
-    /// Words beside a point.
+    /// Adds a text at a point.
     #[must_use]
     pub fn text(mut self, at: (f64, f64), words: impl Into<String>) -> Self {
         self.texts.push((at, words.into()));
         self
     }
 
-    /// The directions of a field, such as the right-hand side of a model with two states, as short
-    /// strokes behind all else: with solutions as lines, a phase portrait.
+    /// Adds a direction field, such as the right-hand side of a model with two states, as short
+    /// strokes in the background: with solutions as lines, a phase portrait.
     #[must_use]
     pub fn field(mut self, field: fn([f64; 2]) -> [f64; 2]) -> Self {
         self.field = Some(field);

@@ -1,4 +1,4 @@
-//! How a solver converges, and how long things take.
+//! Plots of the convergence of solvers, and of run times.
 
 use super::curve::Curve;
 use super::panel::Panel;
@@ -6,11 +6,11 @@ use crate::ocp::{Iteration, Log};
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Bins of a decade.
+/// The number of bins in a decade.
 const BINS: f64 = 12.0;
 
 impl Panel {
-    /// The four residuals of the conditions of optimality over the iterations of a run.
+    /// The four residuals of the optimality conditions over the iterations of a run.
     #[must_use]
     pub fn convergence(log: Log<'_>) -> Self {
         let residual = |of: fn(&Iteration) -> f64| -> Vec<(f64, f64)> {
@@ -36,8 +36,8 @@ impl Panel {
         Self::new(title).x("iteration").log_y()
     }
 
-    /// How often times, or other positive numbers, occur: shares of all, in bins of a twelfth of a
-    /// decade.
+    /// Histograms of times or other positive numbers: their shares of the total, in bins of a
+    /// twelfth of a decade.
     #[must_use]
     pub fn histogram<'a, N: Into<String>>(samples: impl IntoIterator<Item = (N, &'a [f64])>) -> Self {
         samples.into_iter().fold(Self::new("Shares").log_x().log_y(), |panel, (name, times)| {

@@ -1,4 +1,4 @@
-//! Curves in three dimensions, as they are seen from one side.
+//! Curves in three dimensions, in an axonometric view.
 
 use super::axis::ticks;
 use super::draw::{Area, colour_bar, draw_coloured_line, value_range};
@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 type Point3 = [f64; 3];
 
-/// A curve, with what decides about its colour.
+/// A curve with the numbers that determine its colour.
 #[derive(Clone, Debug)]
 struct SpaceCurve {
     name: String,
@@ -18,7 +18,7 @@ struct SpaceCurve {
     width: f64,
 }
 
-/// Curves in a box with three axes of one scale, and their shadows on its floor.
+/// Curves in a box with three axes of equal scale, and their shadows on the floor.
 ///
 /// ```
 /// use casados::plot::{Figure, Space};
@@ -31,14 +31,14 @@ struct SpaceCurve {
 pub struct Space {
     title: String,
     labels: [String; 3],
-    /// Where it is seen from: degrees from the first axis on, and above the floor.
+    /// The view: azimuth from the first axis and elevation above the floor, in degrees.
     azimuth: f64,
     elevation: f64,
     curves: Vec<SpaceCurve>,
     drawn: usize,
 }
 
-/// Where points of the space are on the canvas.
+/// The projection of points to the canvas.
 struct View {
     right: Point3,
     up: Point3,
@@ -60,22 +60,22 @@ impl View {
 }
 
 impl Space {
-    /// A box seen from 30 degrees above, between its first two axes.
+    /// A box, viewed from 30 degrees above, between its first two axes.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
         let labels = ["x", "y", "z"].map(String::from);
         Self { title: title.into(), labels, azimuth: -60.0, elevation: 25.0, curves: Vec::new(), drawn: 0 }
     }
 
-    /// What the axes are called.
+    /// Sets the labels of the axes.
     #[must_use]
     pub fn axes(mut self, labels: [&str; 3]) -> Self {
         self.labels = labels.map(String::from);
         self
     }
 
-    /// Where it is seen from, in degrees: around the third axis from the first one on, and above
-    /// the floor (0 to 90).
+    /// Sets the view in degrees: azimuth around the third axis, starting from the first one, and
+    /// elevation above the floor (0 to 90).
     #[must_use]
     pub fn seen_from(mut self, azimuth: f64, elevation: f64) -> Self {
         let azimuth = if azimuth.is_finite() { azimuth } else { -60.0 };
@@ -84,7 +84,7 @@ impl Space {
         self
     }
 
-    /// A curve. A point with a number that is not finite interrupts it.
+    /// Adds a curve. Points that are not finite interrupt it.
     #[must_use]
     pub fn line(mut self, name: impl Into<String>, points: impl IntoIterator<Item = Point3>) -> Self {
         let colour = Colour::of(self.drawn);
@@ -94,7 +94,7 @@ impl Space {
         self
     }
 
-    /// A curve whose colour is a number at each point; a bar at the right says which.
+    /// Adds a curve coloured by a number at each point; a bar at the right shows the scale.
     #[must_use]
     pub fn coloured(
         mut self,
@@ -106,7 +106,7 @@ impl Space {
         self
     }
 
-    /// The outline of a thing in the colour of ink, without a shadow.
+    /// Adds the outline of an object in the colour of ink, without a shadow.
     #[must_use]
     pub fn outline(mut self, points: impl IntoIterator<Item = Point3>) -> Self {
         let (name, points) = (String::new(), points.into_iter().collect());
@@ -114,7 +114,7 @@ impl Space {
         self
     }
 
-    /// The box around everything.
+    /// The bounding box.
     fn bounds(&self) -> [(f64, f64); 3] {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);
         let all = [0, 1, 2].map(|i| value_range(points().map(|point| &point[i])));
@@ -187,8 +187,8 @@ impl Space {
         });
     }
 
-    /// The floor and the two walls behind, with lines at round numbers, which stand at the edges in
-    /// front.
+    /// Draws the floor and the two rear walls, with lines at the ticks, whose texts are at the
+    /// front edges.
     fn draw_box(&self, canvas: &mut Canvas, view: &View, bounds: [(f64, f64); 3]) {
         let (sin, cos) = self.azimuth.to_radians().sin_cos();
         let [x, y, z] = bounds;
@@ -212,7 +212,7 @@ impl Space {
                 canvas.line(&[view.project([back_x, value, z.1]), floor[0], floor[1]], grid);
                 canvas.draw_text(outwards(floor[1], 16.0), &text, Anchor::Middle);
             }
-            // Numbers of the third axis stand at the left one of the two edges beside.
+            // The ticks of the third axis are at the left one of the two side edges.
             let edges = [[back_x, front_y], [front_x, back_y]];
             let left = |edge: &[f64; 2]| view.project([edge[0], edge[1], z.0]).0;
             let edge = if left(&edges[0]) <= left(&edges[1]) { edges[0] } else { edges[1] };

@@ -1,4 +1,4 @@
-//! Matrices of a model: where they have entries, and of which kind.
+//! Sparsity patterns: the entries of a model's matrices, and their kinds.
 
 use super::draw::Area;
 use super::svg::{Anchor, Canvas, Colour, FONT_HEIGHT, text_width};
@@ -7,7 +7,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// What an entry is, and its colour.
+/// The name of a kind of entries, and its colour.
 type Kind = (&'static str, Colour);
 
 const CONSTANT: Kind = ("constant", Colour(150, 170, 195));
@@ -19,7 +19,7 @@ const FILL: Kind = ("fill", Colour::ORANGE);
 const IDENTITY: Kind = ("pivot that is the identity", Colour::GREEN);
 const PIVOT: Kind = ("other pivot", Colour::INK);
 
-/// The entries of a matrix.
+/// The sparsity pattern of a matrix.
 ///
 /// ```
 /// # use casados::plot::{Figure, Sparsity};
@@ -33,7 +33,7 @@ const PIVOT: Kind = ("other pivot", Colour::INK);
 pub struct Sparsity {
     title: String,
     rows: usize,
-    /// Names of blocks, with their columns.
+    /// The names of blocks, with their numbers of columns.
     blocks: Vec<(&'static str, usize)>,
     /// Row, column, kind.
     entries: Vec<(usize, usize, Kind)>,
@@ -82,7 +82,7 @@ impl Sparsity {
     #[must_use]
     pub fn factors(structure: &Structure) -> Self {
         let plan = &structure.elimination;
-        // When each slot is eliminated; kinematic states are not.
+        // The position of each slot in the elimination; kinematic states have none.
         let mut position = alloc::vec![0; plan.slot_of_equation.len().max(plan.pivots.len())];
         for (order, pivot) in plan.pivots.iter().enumerate() {
             if let Some(place) = position.get_mut(pivot.slot as usize) {
@@ -130,7 +130,7 @@ impl Sparsity {
                     Some(Colour(246, 246, 246)),
                     Some(Colour(170, 170, 170)),
                 );
-                // A block of one or two columns has no room for more than the name of the variable.
+                // A block of one or two columns has room for the name of the variable only.
                 let short = name.rsplit('∂').next().unwrap_or(name);
                 let name = if text_width(name) > across { short } else { name };
                 canvas.draw_text((start + 1.0, top - 6.0), name, Anchor::Start);
@@ -149,7 +149,7 @@ impl Sparsity {
         });
     }
 
-    /// Kinds of entries with their place across and their row.
+    /// The kinds of entries with their horizontal positions and rows.
     fn legend(&self, room: f64) -> Vec<(Kind, f64, f64)> {
         let (mut across, mut row) = (0.0, 0.0);
         let place = |&kind: &Kind| {

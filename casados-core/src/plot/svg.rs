@@ -1,4 +1,4 @@
-//! Shapes as text: a canvas in pixels, from the top left corner on.
+//! Shapes as SVG text, on a canvas in pixels with the origin at its top left corner.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -21,9 +21,9 @@ pub(super) type Point = (f64, f64);
 pub struct Colour(pub u8, pub u8, pub u8);
 
 impl Colour {
-    /// Of frames, numbers and outlines.
+    /// The colour of frames, numbers and outlines.
     pub const INK: Self = Self(40, 40, 40);
-    /// Of lines that help to read.
+    /// The colour of grid lines.
     pub const GRID: Self = Self(225, 225, 225);
     /// The first of the [palette](Self::of).
     pub const BLUE: Self = Self(31, 95, 168);
@@ -31,7 +31,7 @@ impl Colour {
     pub const ORANGE: Self = Self(230, 145, 20);
     /// The third of the palette.
     pub const GREEN: Self = Self(60, 140, 70);
-    /// The fourth of the palette; of limits.
+    /// The fourth of the palette; the colour of limits.
     pub const RED: Self = Self(200, 62, 45);
     /// The fifth of the palette.
     pub const PURPLE: Self = Self(120, 80, 160);
@@ -47,19 +47,19 @@ impl Colour {
         Self(110, 110, 110),
     ];
 
-    /// A colour of the palette, which begins again after eight.
+    /// A colour of the palette, which repeats after eight.
     #[must_use]
     pub fn of(index: usize) -> Self {
         Self::PALETTE[index % Self::PALETTE.len()]
     }
 
-    /// From dark blue at 0 over green to yellow at 1.
+    /// A colour from dark blue at 0 over green to yellow at 1.
     #[must_use]
     pub fn mix(share: f64) -> Self {
         Self::interpolate(&[Self(38, 60, 130), Self(60, 140, 140), Self(245, 200, 60)], share)
     }
 
-    /// From light at 0 to dark at 1.
+    /// A shade from light at 0 to dark at 1.
     #[must_use]
     pub fn shade(share: f64) -> Self {
         Self::interpolate(&[Self(205, 205, 215), Self(15, 15, 90)], share)
@@ -86,7 +86,7 @@ impl fmt::Display for Colour {
     }
 }
 
-/// How a line is drawn.
+/// The appearance of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke {
     pub colour: Colour,
@@ -100,7 +100,7 @@ impl Stroke {
     }
 }
 
-/// Where a text stands: its point is at its begin, in its middle, at its end.
+/// The position of a text's point: at its start, in its middle, at its end.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
     Start,
@@ -111,17 +111,17 @@ pub(super) enum Anchor {
 /// The height of letters in pixels.
 pub(super) const FONT_HEIGHT: f64 = 13.0;
 
-/// How wide a text is, about.
+/// The approximate width of a text in pixels.
 pub(super) fn text_width(text: &str) -> f64 {
     0.56 * FONT_HEIGHT * text.chars().count() as f64
 }
 
-/// A picture as it is drawn.
+/// A picture under construction.
 pub(super) struct Canvas {
     text: String,
 }
 
-/// With a tenth of a pixel, not farther from the picture than what programs read as a number.
+/// A number with one decimal, limited to the range that programs can read.
 fn coordinate_text(value: f64) -> String {
     const LARGEST_COORDINATE: f64 = 1e6;
     let value = if value.is_nan() { 0.0 } else { value.clamp(-LARGEST_COORDINATE, LARGEST_COORDINATE) };
@@ -134,7 +134,7 @@ fn is_finite(point: &Point) -> bool {
     point.0.is_finite() && point.1.is_finite()
 }
 
-/// Text as XML 1.0 has it, which knows no control characters but three.
+/// Escapes text for XML 1.0, which excludes all control characters but three.
 fn escape(text: &str) -> String {
     let is_none = |c: char| (c < ' ' && !"\t\n\r".contains(c)) || ['\u{fffe}', '\u{ffff}'].contains(&c);
     text.replace(is_none, "\u{fffd}")
@@ -162,12 +162,12 @@ impl Canvas {
     }
 
     fn push(&mut self, line: fmt::Arguments<'_>) {
-        // Text that grows does not fail.
+        // Writing to a string does not fail.
         let _ = self.text.write_fmt(line);
         self.text.push('\n');
     }
 
-    /// What belongs together, with a title that a browser shows under the pointer.
+    /// A group with a title, which browsers show as a tooltip.
     pub fn group(&mut self, class: &str, title: &str, draw: impl FnOnce(&mut Self)) {
         self.push(format_args!("<g class=\"{class}\">"));
         if !title.is_empty() {
@@ -177,7 +177,7 @@ impl Canvas {
         self.push(format_args!("</g>"));
     }
 
-    /// A rectangle out of which nothing is drawn.
+    /// Clips the drawing to a rectangle.
     pub fn clipped(&mut self, at: Point, size: Point, draw: impl FnOnce(&mut Self)) {
         let (x, y, w, h) =
             (coordinate_text(at.0), coordinate_text(at.1), coordinate_text(size.0), coordinate_text(size.1));
@@ -188,7 +188,7 @@ impl Canvas {
         self.push(format_args!("</svg>"));
     }
 
-    /// A line through points; what is not finite interrupts it.
+    /// A line through points; points that are not finite interrupt it.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
         for piece in points.split(|point| !is_finite(point)) {
             self.polyline(piece, stroke);
@@ -223,7 +223,7 @@ impl Canvas {
         ));
     }
 
-    /// Strokes of one look, with round ends: one of no length is a dot.
+    /// Strokes of the same appearance with round ends: one of length zero is a dot.
     pub fn strokes(&mut self, strokes: &[[Point; 2]], stroke: Stroke) {
         let mut path = String::new();
         for [from, to] in strokes.iter().filter(|ends| ends.iter().all(is_finite)) {
@@ -258,12 +258,12 @@ impl Canvas {
         self.styled_text(at, text, anchor, "");
     }
 
-    /// Of a panel.
+    /// The heading of a panel.
     pub fn heading(&mut self, at: Point, text: &str) {
         self.styled_text(at, text, Anchor::Start, " font-size=\"15\" font-weight=\"bold\"");
     }
 
-    /// Upwards.
+    /// A text upwards.
     pub fn vertical_text(&mut self, at: Point, text: &str) {
         let turn = format!(" transform=\"rotate(-90 {} {})\"", coordinate_text(at.0), coordinate_text(at.1));
         self.styled_text(at, text, Anchor::Middle, &turn);

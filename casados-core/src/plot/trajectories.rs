@@ -1,4 +1,4 @@
-//! Solutions of problems of optimal control over time, with their bounds.
+//! Plots of the solutions of optimal control problems over time, with their bounds.
 
 use super::curve::Curve;
 use super::panel::Panel;
@@ -10,27 +10,27 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Without multipliers a bound is active to this part of the span of the values.
+/// Without multipliers a bound is active within this part of the range of the values.
 const ACTIVE_BOUND_TOLERANCE: f64 = 1e-4;
 
-/// A value with what bounds it.
+/// A value with its bounds.
 #[derive(Clone, Copy)]
 struct BoundedValue {
     time: f64,
     value: f64,
     bounds: [f64; 2],
-    /// Those of both bounds, if they are known.
+    /// The multipliers of both bounds, if known.
     multipliers: Option<[f64; 2]>,
 }
 
 impl BoundedValue {
-    /// Whether it is given: its bounds are the same.
+    /// Whether the value is fixed: its bounds are equal.
     fn is_given(&self) -> bool {
         self.bounds[0] >= self.bounds[1]
     }
 
-    /// Whether a bound holds it: of distance and multiplier, whose product vanishes at a solution,
-    /// the multiplier is larger; without multipliers, whether it is there.
+    /// Whether a bound is active: the multiplier is larger than the distance, whose product
+    /// vanishes at a solution; without multipliers, whether the value is at the bound.
     fn is_active(&self, span: f64) -> bool {
         let near = [ACTIVE_BOUND_TOLERANCE * span; 2];
         let forces = self.bounds.into_iter().zip(self.multipliers.unwrap_or(near));
@@ -39,15 +39,14 @@ impl BoundedValue {
 }
 
 impl Panel {
-    /// A solution over time, as [`Ocp::solution`](crate::ocp::Ocp::solution) or `dense_solution`
-    /// makes it: all that a name means, of states, algebraic states, controls, parameters and
-    /// constraints. `x` are all states, `Corner[2]` is an output of a constraint.
+    /// A panel of a solution over time, as returned by [`Ocp::solution`](crate::ocp::Ocp::solution)
+    /// or `dense_solution`: all states, algebraic states, controls, parameters and outputs of
+    /// constraints with this name. `x` selects all states, `Corner[2]` an output of a constraint.
     ///
-    /// Controls are stairs, those that are linear in intervals lines. Bounds are dashed, where they
-    /// are not far from the values; where one is active the line is wide. Axes have the units that
-    /// doc comments of the model say ([`Units`](crate::structure::Units)) or
-    /// [`Trajectory::set_unit`] did; where the units of several lines differ, each name has its
-    /// own.
+    /// Controls are steps, or lines if they are piecewise linear. Bounds near the values are
+    /// dashed; the line is wide where one is active. Units are those of the model's doc comments
+    /// ([`Units`](crate::structure::Units)) or of [`Trajectory::set_unit`]: at the axis, or behind
+    /// each name if they differ.
     ///
     /// # Errors
     /// [`TrajectoryError::Unknown`]
@@ -55,7 +54,7 @@ impl Panel {
         let found: Vec<_> =
             solution.series().iter().filter(|series| name_matches(name, &series.name)).collect();
         if found.is_empty() {
-            // The error that lists the names.
+            // The error lists the names.
             solution.get(name)?;
         }
         let panel = Self::new(format!("{}: {name}", solution.model()));
@@ -72,7 +71,7 @@ impl Panel {
     }
 }
 
-/// A name with its unit, if there is one: `speed, m/s`.
+/// A name with its unit, if any: `speed, m/s`.
 fn with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.into() } else { format!("{name}, {unit}") }
 }
@@ -103,12 +102,12 @@ fn bounded_values<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series
     points
 }
 
-/// Whether values are held over intervals: of controls that are not linear, and of rates.
+/// Whether values are constant on intervals: controls that are not piecewise linear, and rates.
 fn is_piecewise_constant<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> bool {
     matches!(series.kind, Kind::Control | Kind::Rate) && series.values.len() < solution.times().len()
 }
 
-/// A line with its bounds, and where they are active.
+/// A line with its bounds, which marks active ones.
 fn line_with_bounds<T: Real>(
     solution: &Trajectory<T>,
     series: &crate::ocp::Series<T>,

@@ -1,4 +1,4 @@
-//! Many quadratic programs at once, shared among threads.
+//! Batches of quadratic programs, solved in threads and SIMD lanes.
 
 use super::error::QpError;
 use super::instance::QpInstance;
@@ -12,22 +12,21 @@ use super::statistics::QpStatistics;
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// What became of a problem.
+/// The status of a problem.
 type Status = Result<QpStatistics, QpError>;
 
 /// An [`InteriorPoint`](super::InteriorPoint) for many problems, each with its own data,
 /// dimensions, solution and status.
 ///
-/// Problems in which nothing but controls has bounds, all of them hard, and whose state at the
-/// start is given, are solved side by side in registers where their dimensions are the same: by
-/// active sets, which are exact where an interior point stops at its tolerance. What needs more
-/// than that is solved alone. A problem that is infeasible or has no finite data says so by itself;
-/// verdicts are those of single solves, and so are solutions: to the bit of problems solved alone,
-/// to the tolerance of those solved [together](BatchInteriorPoint::together).
+/// Problems of equal dimensions with a fixed initial state, hard bounds of controls and no other
+/// bounds are solved side by side in SIMD lanes, by active sets: their solutions are exact, where
+/// an interior point stops at its tolerance. All other problems are solved one by one. An
+/// infeasible problem or one with non-finite data has an error as its status. Statuses are those of
+/// single solves. Solutions are bitwise those of single solves for problems solved one by one, and
+/// equal up to the tolerance for problems solved [together](BatchInteriorPoint::together).
 ///
-/// With the feature `parallel` problems are shared among the threads of rayon; solutions do not
-/// depend on how many there are. Memory is allocated by the first call and by calls with larger
-/// problems only.
+/// With the feature `parallel` the threads of rayon share the problems; solutions do not depend on
+/// the number of threads. Only the first call and calls with larger problems allocate memory.
 ///
 /// # Example
 /// ```
@@ -57,19 +56,19 @@ type Status = Result<QpStatistics, QpError>;
 /// ```
 #[derive(Clone, Debug)]
 pub struct BatchInteriorPoint<T: Real = f64> {
-    /// Options of all problems, which may be changed between calls.
+    /// Options for all problems, which may be changed between calls.
     pub options: InteriorPointOptions,
-    /// How many threads share the problems at most; as many as rayon has by default.
+    /// The maximum number of threads; by default that of rayon.
     #[cfg(feature = "parallel")]
     pub threads: usize,
-    /// Whether problems may be solved side by side in registers. Default true.
+    /// Whether problems may be solved side by side in SIMD lanes. Default true.
     pub together: bool,
-    /// One for each thread.
+    /// A worker for each thread.
     workers: Vec<Worker<T>>,
     statuses: Vec<Status>,
 }
 
-/// What a thread works with.
+/// The solver and the memory of a thread.
 #[derive(Clone, Debug)]
 struct Worker<T: Real> {
     solver: HeapInteriorPoint<T>,
@@ -83,7 +82,7 @@ impl<T: Real> Default for BatchInteriorPoint<T> {
 }
 
 impl<T: Real> BatchInteriorPoint<T> {
-    /// A solver without memory: the first call allocates it.
+    /// A solver without memory, which the first call allocates.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -96,9 +95,9 @@ impl<T: Real> BatchInteriorPoint<T> {
         }
     }
 
-    /// Solves all problems: the status of each, as [`QpSolver::solve`] of
-    /// [`InteriorPoint`](super::InteriorPoint) has it. A warm start begins at the solution that an
-    /// instance holds.
+    /// Solves all problems, and returns the status of each, as [`QpSolver::solve`] of
+    /// [`InteriorPoint`](super::InteriorPoint) does. A warm start begins at the solution of the
+    /// instance.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`]: nothing was solved.
@@ -115,11 +114,9 @@ impl<T: Real> BatchInteriorPoint<T> {
         }
         let (options, together) = (self.options, self.together);
         let size_of = |instance: &QpInstance<T>| lanes::size(instance, &options).filter(|_| together);
-        // A thread takes as many as registers are filled with, or one after the other.
+        // A thread takes a multiple of the lanes of a register, or, without lanes, one problem.
         let portion = match instances.first().and_then(size_of) {
-            Some(_) => {
-                count.div_ceil(threads.max(1)).next_multiple_of(CHUNK_GRANULARITY).min(MAX_GRANULES_PER_CHUNK)
-            }
+            Some(_) => count.div_ceil(threads.max(1)).next_multiple_of(CHUNK_GRANULARITY).min(MAX_CHUNK_SIZE),
             None => 1,
         };
         let workers = self.workers.get_mut(..threads).unwrap_or_default();
@@ -131,7 +128,7 @@ impl<T: Real> BatchInteriorPoint<T> {
         Ok(&self.statuses)
     }
 
-    /// How many threads there are.
+    /// Returns the number of threads.
     fn threads(&self) -> usize {
         #[cfg(feature = "parallel")]
         return threads(self.threads);
@@ -140,12 +137,13 @@ impl<T: Real> BatchInteriorPoint<T> {
     }
 }
 
-/// Problems that a thread takes: a multiple of this many, whole registers, and no more than that.
+/// The number of problems that a thread takes at a time is a multiple of `CHUNK_GRANULARITY`, which
+/// fills whole registers, and at most `MAX_GRANULES_PER_CHUNK`.
 const CHUNK_GRANULARITY: usize = 16;
-const MAX_GRANULES_PER_CHUNK: usize = 64;
+const MAX_CHUNK_SIZE: usize = 64;
 
 impl<T: Real> Worker<T> {
-    /// Solves problems: neighbours of one size together.
+    /// Solves problems; consecutive problems of equal dimensions are solved together.
     fn solve(
         &mut self,
         mut instances: &mut [QpInstance<T>],
@@ -156,9 +154,9 @@ impl<T: Real> Worker<T> {
         let Self { solver, together } = self;
         while let Some(first) = instances.first() {
             let size = size_of(first);
-            let alike = instances.iter().take_while(|instance| size_of(instance) == size).count();
-            let own = take_mut(&mut instances, alike);
-            let statuses = take_mut(&mut statuses, alike);
+            let equal_sized = instances.iter().take_while(|instance| size_of(instance) == size).count();
+            let own = take_mut(&mut instances, equal_sized);
+            let statuses = take_mut(&mut statuses, equal_sized);
             let solved = match size {
                 Some(size) => lanes::solve(together, size, (own, statuses), (&solver.options, start)).is_ok(),
                 None => false,
@@ -171,7 +169,7 @@ impl<T: Real> Worker<T> {
             if solved {
                 together.unsolved_indices().for_each(alone);
             } else {
-                (0..alike).for_each(&mut alone);
+                (0..equal_sized).for_each(&mut alone);
             }
         }
     }

@@ -1,17 +1,17 @@
-//! Views of matrices in memory that somebody else laid out.
+//! Views of matrices in the memory of a QP.
 
 use super::error::{QpError, QpField};
 
-/// Where the elements of a matrix lie.
+/// The layout of a matrix.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MatrixLayout {
     pub field: QpField,
     pub stage: usize,
     pub rows: usize,
     pub columns: usize,
-    /// From one row to the next.
+    /// The stride of rows.
     pub row: usize,
-    /// From one column to the next.
+    /// The stride of columns.
     pub column: usize,
 }
 
@@ -21,7 +21,7 @@ impl MatrixLayout {
     }
 }
 
-/// A matrix that can be read.
+/// A read-only matrix.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -49,7 +49,7 @@ pub struct Block<'a, T> {
     pub(super) shape: MatrixLayout,
 }
 
-/// A matrix that can be read and written.
+/// A mutable matrix.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -79,12 +79,12 @@ pub struct BlockMut<'a, T> {
 }
 
 impl<T: Copy> Block<'_, T> {
-    /// Rows and columns.
+    /// Returns the numbers of rows and columns.
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
         (self.shape.rows, self.shape.columns)
     }
-    /// An element.
+    /// Returns an element.
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> Option<T> {
         self.data.get(self.shape.index(row, column)?).copied()
@@ -92,19 +92,19 @@ impl<T: Copy> Block<'_, T> {
 }
 
 impl<T: Copy> BlockMut<'_, T> {
-    /// For reading.
+    /// Returns a read-only view.
     #[must_use]
     pub fn as_block(&self) -> Block<'_, T> {
         Block { data: self.data, shape: self.shape }
     }
-    /// An element; nothing where there is none.
+    /// Writes an element; does nothing if it does not exist.
     pub fn set(&mut self, row: usize, column: usize, value: T) {
         let index = self.shape.index(row, column);
         if let Some(element) = index.and_then(|i| self.data.get_mut(i)) {
             *element = value;
         }
     }
-    /// Every element, as a function of row and column.
+    /// Writes every element by a function of row and column.
     pub fn fill_with(&mut self, mut element: impl FnMut(usize, usize) -> T) {
         for column in 0..self.shape.columns {
             for row in 0..self.shape.rows {
@@ -112,7 +112,7 @@ impl<T: Copy> BlockMut<'_, T> {
             }
         }
     }
-    /// All elements, column after column (`as_slice()` of a matrix of nalgebra).
+    /// Writes all elements, column after column (`as_slice()` of a matrix of nalgebra).
     ///
     /// # Errors
     /// [`QpError::Dimension`]
@@ -129,7 +129,7 @@ impl<T: Copy> BlockMut<'_, T> {
         }
         Ok(())
     }
-    /// The diagonal; other elements become zero.
+    /// Writes the diagonal; other elements become zero.
     pub fn set_diagonal(&mut self, diagonal: impl IntoIterator<Item = T>)
     where
         T: Default,

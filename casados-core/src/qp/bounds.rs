@@ -1,12 +1,12 @@
-//! Bounds of some components of a stage, and their penalties.
+//! Bounds of the components of a stage, and their penalties.
 
 use super::error::Side;
 use crate::scalar::Real;
 
-/// Bounds of some components, and what it costs to leave them.
+/// Bounds of components, and penalties of their violations.
 ///
-/// A violation `e` of a soft bound costs `linear · e + ½ quadratic · e²`. A bound whose linear
-/// penalty is infinite, as that of every new QP, is hard.
+/// A violation `e` of a soft bound costs `linear · e + ½ quadratic · e²`. A bound is hard if its
+/// linear penalty is infinite, as in a new QP.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -29,9 +29,9 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds<'a, T> {
-    /// −∞ where there is none.
+    /// Lower bounds; −∞ for none.
     pub lower: &'a [T],
-    /// +∞ where there is none.
+    /// Upper bounds; +∞ for none.
     pub upper: &'a [T],
     /// Linear penalties of the lower bounds.
     pub lower_linear: &'a [T],
@@ -43,7 +43,7 @@ pub struct Bounds<'a, T> {
     pub upper_quadratic: &'a [T],
 }
 
-/// As [`Bounds`], to be written.
+/// A mutable view of [`Bounds`].
 ///
 /// ```
 /// # use casados::qp::*;
@@ -70,9 +70,9 @@ pub struct Bounds<'a, T> {
 /// ```
 #[derive(Debug)]
 pub struct BoundsMut<'a, T> {
-    /// −∞ where there is none.
+    /// Lower bounds; −∞ for none.
     pub lower: &'a mut [T],
-    /// +∞ where there is none.
+    /// Upper bounds; +∞ for none.
     pub upper: &'a mut [T],
     /// Linear penalties of the lower bounds.
     pub lower_linear: &'a mut [T],
@@ -85,7 +85,7 @@ pub struct BoundsMut<'a, T> {
 }
 
 impl<T: Real> BoundsMut<'_, T> {
-    /// One component; none if there is not as much.
+    /// Sets the bounds of a component; does nothing if it does not exist.
     pub fn set(&mut self, index: usize, lower: T, upper: T) {
         for (bounds, value) in [(&mut *self.lower, lower), (&mut *self.upper, upper)] {
             if let Some(bound) = bounds.get_mut(index) {
@@ -93,12 +93,12 @@ impl<T: Real> BoundsMut<'_, T> {
             }
         }
     }
-    /// Makes both bounds of a component soft; of none if there is not as much.
+    /// Makes both bounds of a component soft; does nothing if it does not exist.
     pub fn soften(&mut self, index: usize, linear: T, quadratic: T) {
         self.soften_side(index, Side::Lower, linear, quadratic);
         self.soften_side(index, Side::Upper, linear, quadratic);
     }
-    /// Makes one bound of a component soft; of none if there is not as much.
+    /// Makes one bound of a component soft; does nothing if it does not exist.
     pub fn soften_side(&mut self, index: usize, side: Side, linear: T, quadratic: T) {
         let [of_linear, of_quadratic] = match side {
             Side::Lower => [&mut *self.lower_linear, &mut *self.lower_quadratic],

@@ -1,11 +1,11 @@
-//! Whether data makes sense.
+//! Checks of the data of a QP.
 
 use super::bounds::Bounds;
 use super::error::{QpError, QpField};
 use super::problem::QpView;
 use crate::scalar::Real;
 
-/// Finds numbers that make no sense.
+/// Checks all numbers of a QP.
 ///
 /// # Errors
 /// [`QpError::InvalidValue`], [`QpError::CrossedBounds`]
@@ -65,10 +65,10 @@ pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     check_all_bounds(qp)
 }
 
-/// Finds bounds and penalties that make no sense.
+/// Checks all bounds and penalties of a QP.
 pub(super) fn check_all_bounds<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     for (k, stage) in qp.stages().enumerate() {
-        // Only where some make none they are looked for.
+        // The invalid bound is located only if there is one.
         if !are_valid_bounds(&stage.all_bounds()) {
             report_invalid_bound(QpField::StateBounds, k, &stage.x_bounds())?;
             report_invalid_bound(QpField::ControlBounds, k, &stage.u_bounds())?;
@@ -86,14 +86,14 @@ fn finite<T: Real>(field: QpField, stage: usize, index: usize, value: T) -> Resu
     }
 }
 
-/// Whether there are numbers between two bounds.
+/// Returns whether the interval between two bounds is not empty.
 #[inline(always)]
 fn is_nonempty_interval<T: Real>(lower: T, upper: T) -> bool {
     let infinity = T::from_f64(f64::INFINITY);
     (lower <= upper) & (lower < infinity) & (upper > -infinity)
 }
 
-/// A linear penalty may be infinite: then the bound is hard.
+/// Returns whether a linear penalty is valid. It may be infinite: then the bound is hard.
 #[inline(always)]
 fn is_linear_penalty<T: Real>(penalty: T) -> bool {
     penalty >= T::ZERO
@@ -104,7 +104,7 @@ fn is_quadratic_penalty<T: Real>(penalty: T) -> bool {
     (penalty >= T::ZERO) & (penalty < T::from_f64(f64::INFINITY))
 }
 
-/// Whether all bounds and penalties make sense, without a branch for each.
+/// Returns whether all bounds and penalties are valid, without a branch for each.
 fn are_valid_bounds<T: Real>(bounds: &Bounds<'_, T>) -> bool {
     let mut good = true;
     for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
@@ -119,7 +119,7 @@ fn are_valid_bounds<T: Real>(bounds: &Bounds<'_, T>) -> bool {
     good
 }
 
-/// The first that does not.
+/// Returns the error of the first invalid bound or penalty.
 fn report_invalid_bound<T: Real>(
     field: QpField,
     stage: usize,

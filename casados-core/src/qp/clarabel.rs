@@ -1,13 +1,13 @@
-//! The solver clarabel behind the trait of this library (feature `clarabel`).
+//! The solver Clarabel as a [`QpSolver`] (feature `clarabel`).
 
 use super::check::check;
 use super::error::{QpError, QpField, Side};
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, QpStart};
 pub use super::sparse::SecondOrderCone;
-use super::sparse::{Origin, Sparse, Triplets};
+use super::sparse::{RowOrigin, Sparse, Triplets};
 use super::statistics::{QpStatistics, Residuals};
 use alloc::vec::Vec;
 use clarabel::algebra::CscMatrix;
@@ -15,17 +15,17 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 
 /// Clarabel's interior point for sparse problems.
 ///
-/// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order
-/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept
-/// as long as the elements that are not zero stay the same.
+/// It is slower than [`InteriorPoint`](super::InteriorPoint), but supports second-order cones and
+/// shares no code with it. Every start is cold. The symbolic factorisation is reused while the
+/// sparsity pattern is the same.
 ///
-/// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
-/// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,
-/// says what it needs ([`QpSolver::require`]): then a part of that is asked for, and what satisfies
-/// the settings is accepted.
+/// Clarabel's tolerances are relative to the sizes of terms, and one of its two tolerances for the
+/// duality gap suffices. Callers that measure absolute residuals, as SQP does, set the required
+/// accuracy by [`QpSolver::require`]: Clarabel then iterates to a fraction of it, and solutions
+/// that satisfy the settings are accepted.
 ///
-/// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
-/// and a violation that at least one constraint must have.
+/// For an infeasible problem the error names the constraint with the largest multiplier in the
+/// certificate, and a lower bound of the largest violation.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -50,19 +50,19 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 pub struct Clarabel {
     /// Clarabel's own options, which may be changed between calls.
     pub settings: DefaultSettings<f64>,
-    /// Constraints beyond those of the QP. They are checked when a problem is solved.
+    /// Constraints in addition to those of the QP. They are checked by each solve.
     pub cones: Vec<SecondOrderCone>,
-    /// What the caller needs; infinite if nobody said so.
-    needed: f64,
+    /// The residual that the caller requires; infinite by default.
+    required_residual: f64,
     previous: Option<PreviousSolver>,
 }
 
-/// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
-/// size is not known beforehand, and the least that is asked for.
+/// The fraction of the required residual that Clarabel iterates to, since its tolerances are
+/// relative to terms of unknown size, and the smallest tolerance.
 const TOLERANCE_FRACTION: f64 = 1e-3;
 const MIN_TOLERANCE: f64 = 1e-13;
 
-/// A solver and the pattern that it is for.
+/// A solver and its sparsity pattern.
 struct PreviousSolver {
     solver: DefaultSolver<f64>,
     p: CscMatrix<f64>,
@@ -77,7 +77,7 @@ impl Default for Clarabel {
 }
 
 impl Clarabel {
-    /// A solver that is silent, with tolerances of 1e-9.
+    /// A solver without output, with tolerances of 1e-9.
     #[must_use]
     pub fn new() -> Self {
         let settings = DefaultSettings {
@@ -88,7 +88,7 @@ impl Clarabel {
             tol_feas: 1e-9,
             ..DefaultSettings::default()
         };
-        Self { settings, cones: Vec::new(), needed: f64::INFINITY, previous: None }
+        Self { settings, cones: Vec::new(), required_residual: f64::INFINITY, previous: None }
     }
 
     /// # Errors
@@ -124,19 +124,19 @@ impl Clarabel {
         Ok(())
     }
 
-    /// The settings, with the tolerances that the caller needs. Those of the settings are then what
-    /// is accepted where these are not reached.
-    fn refined(&self) -> DefaultSettings<f64> {
+    /// Returns the settings with the required tolerances. The tolerances of the settings become the
+    /// reduced ones, which are accepted if the required ones are not reached.
+    fn settings_with_required_tolerance(&self) -> DefaultSettings<f64> {
         let mut settings = self.settings.clone();
-        let asked = (TOLERANCE_FRACTION * self.needed).max(MIN_TOLERANCE);
-        if asked < f64::INFINITY {
+        let required = (TOLERANCE_FRACTION * self.required_residual).max(MIN_TOLERANCE);
+        if required < f64::INFINITY {
             let s = &mut settings;
             for (tolerance, reduced) in [
                 (&mut s.tol_gap_abs, &mut s.reduced_tol_gap_abs),
                 (&mut s.tol_gap_rel, &mut s.reduced_tol_gap_rel),
                 (&mut s.tol_feas, &mut s.reduced_tol_feas),
             ] {
-                (*reduced, *tolerance) = (*tolerance, tolerance.min(asked));
+                (*reduced, *tolerance) = (*tolerance, tolerance.min(required));
             }
         }
         settings
@@ -178,7 +178,7 @@ impl Clarabel {
         Ok(())
     }
 
-    /// The solver, with new data.
+    /// Returns the solver with new data.
     fn prepare(&mut self, sparse: Sparse) -> Result<(&mut DefaultSolver<f64>, Sparse), QpError> {
         let p = matrix(&sparse.p, sparse.q.len(), sparse.q.len());
         let k = matrix(&sparse.k, sparse.b.len(), sparse.q.len());
@@ -195,15 +195,15 @@ impl Clarabel {
                 && equal(&previous.k, &k)
                 && (previous.k.m, &previous.cones) == (k.m, &cones)
         };
-        let settings = self.refined();
-        // Settings that hold for the life of a solver are refused, and make a new one.
+        let settings = self.settings_with_required_tolerance();
+        // Clarabel rejects updates of some settings; then a new solver is created.
         let updated = self.previous.as_mut().filter(|previous| same(previous)).is_some_and(|previous| {
             previous.solver.update_settings(settings.clone()).is_ok()
                 && previous.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
         });
         if !updated {
-            // What clarabel checks here are the dimensions, which are right by construction, and
-            // the user's settings.
+            // Clarabel checks the dimensions, which are correct by construction, and the user's
+            // settings.
             let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, settings);
             let invalid =
                 QpError::InvalidValue { field: QpField::Settings, stage: 0, index: 0, value: f64::NAN };
@@ -216,7 +216,7 @@ impl Clarabel {
     }
 }
 
-/// Sorted by columns and rows.
+/// Returns a matrix sorted by columns and rows.
 fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
     let mut elements: Vec<_> = triplets.elements.clone();
     elements.sort_unstable_by_key(|&(column, row, _)| (column, row));
@@ -238,7 +238,7 @@ fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
 
 impl QpSolver<f64> for Clarabel {
     fn require(&mut self, tolerance: f64) {
-        self.needed = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
+        self.required_residual = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
     }
 
     fn solve_until(
@@ -252,12 +252,12 @@ impl QpSolver<f64> for Clarabel {
         solution.check_dimensions(qp)?;
         self.check_settings()?;
         self.check_cones(qp)?;
-        let is_refined = self.needed.is_finite();
+        let is_refined = self.required_residual.is_finite();
         let (solver, sparse) = self.prepare(Sparse::new(qp, &self.cones))?;
         solver.solve();
         let found = &solver.solution;
         let SolutionView { v, dynamics, lower, upper, .. } = solution;
-        for (place, &column) in Places::<f64>::new(qp.dims()).zip(&sparse.columns) {
+        for (place, &column) in StageOffsetsIter::<f64>::new(qp.dims()).zip(&sparse.columns) {
             let from = found.x.get(column..column + place.n).unwrap_or_default();
             for (v, &x) in v.get_mut(place.v..).unwrap_or_default().iter_mut().zip(from) {
                 *v = x;
@@ -267,12 +267,12 @@ impl QpSolver<f64> for Clarabel {
         upper.fill(0.0);
         for (origin, &z) in sparse.origins.iter().zip(&found.z) {
             let (to, index, z) = match *origin {
-                Origin::Dynamics(i) => (&mut *dynamics, i, z),
-                Origin::Equation(i) if z >= 0.0 => (&mut *upper, i, z),
-                Origin::Equation(i) => (&mut *lower, i, -z),
-                Origin::Lower(i) | Origin::Cone(i) => (&mut *lower, i, z),
-                Origin::Upper(i) => (&mut *upper, i, z),
-                Origin::Sign | Origin::Coupling => continue,
+                RowOrigin::Dynamics(i) => (&mut *dynamics, i, z),
+                RowOrigin::Equation(i) if z >= 0.0 => (&mut *upper, i, z),
+                RowOrigin::Equation(i) => (&mut *lower, i, -z),
+                RowOrigin::Lower(i) | RowOrigin::Cone(i) => (&mut *lower, i, z),
+                RowOrigin::Upper(i) => (&mut *upper, i, z),
+                RowOrigin::Sign | RowOrigin::Coupling => continue,
             };
             if let Some(to) = to.get_mut(index) {
                 *to = z;
@@ -306,25 +306,27 @@ impl QpSolver<f64> for Clarabel {
     }
 }
 
-/// `Kᵀ z = 0` and `bᵀ z < 0` say that the largest violation is at least `−bᵀ z / Σ |z|`.
+/// Returns the error of a certificate: `Kᵀ z = 0` and `bᵀ z < 0` imply that the largest violation
+/// is at least `−bᵀ z / Σ |z|`.
 fn infeasibility_error(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
     let product: f64 = sparse.b.iter().zip(z).map(|(b, z)| b * z).sum();
     let violation = -product / z.iter().map(|z| z.abs()).sum::<f64>();
     let mut largest = (0.0, 0, Side::Lower);
     for (origin, z) in sparse.origins.iter().zip(z) {
         let (row, side) = match *origin {
-            Origin::Equation(row) if *z > 0.0 => (row, Side::Upper),
-            Origin::Equation(row) | Origin::Lower(row) | Origin::Cone(row) => (row, Side::Lower),
-            Origin::Upper(row) => (row, Side::Upper),
-            Origin::Dynamics(_) | Origin::Sign | Origin::Coupling => continue,
+            RowOrigin::Equation(row) if *z > 0.0 => (row, Side::Upper),
+            RowOrigin::Equation(row) | RowOrigin::Lower(row) | RowOrigin::Cone(row) => (row, Side::Lower),
+            RowOrigin::Upper(row) => (row, Side::Upper),
+            RowOrigin::Dynamics(_) | RowOrigin::Sign | RowOrigin::Coupling => continue,
         };
         if z.abs() > largest.0 {
             largest = (z.abs(), row, side);
         }
     }
     let (_, row, side) = largest;
-    let place =
-        Places::<f64>::new(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
+    let place = StageOffsetsIter::<f64>::new(qp.dims())
+        .find(|p| (p.row..p.row + p.rows).contains(&row))
+        .unwrap_or_default();
     let (field, index) = place.field_of_row(row - place.row);
     QpError::Infeasible { field, stage: place.stage, index, side, violation }
 }

@@ -1,9 +1,9 @@
-//! Single elements of slices, by indices of which nobody is sure: where there is none, nothing is
-//! read or written.
+//! Bounds-checked access to elements of slices: out of range, reads return zero and writes do
+//! nothing.
 
 use crate::scalar::Real;
 
-/// An element, or zero.
+/// Returns an element, or zero.
 #[inline(always)]
 pub fn get<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or(T::ZERO)

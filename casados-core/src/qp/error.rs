@@ -1,4 +1,4 @@
-//! Every way in which a QP can end without a solution.
+//! Errors of QP solvers.
 
 use super::statistics::Residuals;
 use core::fmt;
@@ -49,11 +49,11 @@ pub enum QpField {
     GeneralBounds,
     /// Penalties of a soft constraint.
     Penalty,
-    /// States, of a solution.
+    /// States of a solution.
     X,
-    /// Controls, of a solution.
+    /// Controls of a solution.
     U,
-    /// Multipliers, of a solution.
+    /// Multipliers of a solution.
     Multipliers,
     /// The number of stages.
     Stages,
@@ -61,9 +61,9 @@ pub enum QpField {
     Data,
     /// Memory for a solution.
     Solution,
-    /// Numbers that a solver works with.
+    /// Numbers in the memory of a solver.
     Numbers,
-    /// Indices that a solver works with.
+    /// Indices in the memory of a solver.
     Indices,
     /// Options of a solver.
     Settings,
@@ -101,7 +101,7 @@ pub enum Side {
     Upper,
 }
 
-/// Why there is no solution: what, at which stage, and the values that say so.
+/// The error of a solve, with the part, the stage and the values.
 ///
 /// After `Infeasible`, `MaxIterations`, `OutOfTime`, `Stalled` and `NotConvex` the solution holds
 /// the best iterate.
@@ -131,88 +131,87 @@ pub enum Side {
 #[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
-    /// A length is not what the dimensions ask for.
+    /// A length differs from that of the dimensions.
     Dimension {
-        /// What is too short or too long.
+        /// The part with this length.
         field: QpField,
-        /// The stage, 0 where it is the whole horizon.
+        /// The stage; 0 for the whole horizon.
         stage: usize,
-        /// The length that is needed.
+        /// The required length.
         expected: usize,
-        /// The length that was given.
+        /// The given length.
         found: usize,
     },
     /// A lower bound is above the upper one.
     CrossedBounds {
-        /// Which bounds.
+        /// The kind of bounds.
         field: QpField,
         /// The stage.
         stage: usize,
         /// The element.
         index: usize,
-        /// Its lower bound.
+        /// The lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// The upper bound.
         upper: f64,
     },
-    /// A number is infinite or NaN and must not be (a bound may be infinite on its own side), or a
-    /// penalty is negative.
+    /// A number is infinite or NaN where it must be finite (a bound may be infinite on its own
+    /// side), or a penalty is negative.
     InvalidValue {
-        /// Where.
+        /// The part.
         field: QpField,
         /// The stage.
         stage: usize,
-        /// The element; of matrices in column-major order.
+        /// The element; for matrices in column-major order.
         index: usize,
         /// Its value.
         value: f64,
     },
-    /// No point satisfies all constraints. This is the largest violation where their sum is
-    /// smallest.
+    /// No point satisfies all constraints. The error has the largest violation at the point with
+    /// the smallest sum of violations.
     Infeasible {
-        /// Which bounds.
+        /// The kind of bounds.
         field: QpField,
         /// The stage.
         stage: usize,
         /// The element.
         index: usize,
-        /// The side that is violated.
+        /// The violated side.
         side: Side,
-        /// By how much.
+        /// The violation.
         violation: f64,
     },
-    /// The Hessian is indefinite where the dynamics leave freedom: there is no minimum.
+    /// The reduced Hessian is indefinite: there is no minimum.
     NotConvex {
         /// The stage.
         stage: usize,
-        /// The variable: a control, or, at stage 0, behind the controls a state.
+        /// The variable: a control, or, at stage 0, `nu` plus the index of a state.
         index: usize,
         /// The pivot, which must be positive.
         pivot: f64,
     },
-    /// States are periodic or controls shared, and this solver has no such conditions:
-    /// [`InteriorPoint`](super::InteriorPoint) has, with the feature `alloc`.
+    /// States are periodic or controls shared, which this solver does not support;
+    /// [`InteriorPoint`](super::InteriorPoint) does, with the feature `alloc`.
     Coupled,
     /// The maximum number of iterations was reached.
     MaxIterations {
-        /// How many.
+        /// The number of iterations.
         iterations: usize,
-        /// What they reached.
+        /// The residuals at the end.
         residuals: Residuals,
     },
     /// The time limit was reached.
     OutOfTime {
-        /// The iterations.
+        /// The number of iterations.
         iterations: usize,
-        /// What they reached.
+        /// The residuals at the end.
         residuals: Residuals,
     },
-    /// Steps became too short, or residuals no longer shrink: rounding errors, or an unbounded
-    /// problem.
+    /// Steps became too short, or residuals stagnate: rounding errors, or an unbounded problem.
     Stalled {
-        /// The iterations.
+        /// The number of iterations.
         iterations: usize,
-        /// What they reached.
+        /// The residuals at the end.
         residuals: Residuals,
     },
     /// An option of a solver is out of range.
@@ -221,12 +220,12 @@ pub enum QpError {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// Memory could not be allocated.
     OutOfMemory {
-        /// How much was asked for.
+        /// The size of the allocation.
         bytes: usize,
     },
 }

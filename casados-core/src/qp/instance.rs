@@ -4,7 +4,7 @@ use super::problem::HeapQp;
 use super::solution::HeapSolution;
 use crate::scalar::Real;
 
-/// A quadratic program of a batch, and the memory of its solution.
+/// A quadratic program of a batch, with the memory of its solution.
 ///
 /// ```
 /// use casados::qp::{HeapQp, HeapSolution, QpInstance, StageDims};
@@ -18,6 +18,6 @@ use crate::scalar::Real;
 pub struct QpInstance<T: Real = f64> {
     /// The data.
     pub qp: HeapQp<T>,
-    /// Where the solution is written, and read by warm starts.
+    /// The solution, which warm starts read.
     pub solution: HeapSolution<T>,
 }

@@ -6,15 +6,14 @@
 //!      lb ≤ (x, u) ≤ ub,   lg ≤ C x + D u ≤ ug      each side optional, each side hard or soft
 //! ```
 //!
-//! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds),
-//! bounded or free. States may be periodic, and controls the same at all stages.
+//! Dimensions may differ from stage to stage. The initial state is fixed (two equal bounds),
+//! bounded or free. States may be periodic, and controls shared by all stages.
 //!
-//! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on
+//! - [`Qp`] is the data, [`Solution`] a point with multipliers; the caller owns their memory, on
 //!   the heap or not.
-//! - [`QpSolver`] is what every solver does: [`InteriorPoint`], which is the library's own and
-//!   needs neither heap nor `std`; the same over a problem that is partially condensed first
-//!   (`Condensing`); and clarabel (feature `clarabel`).
-//! - [`residuals`] says how well a point satisfies the conditions of optimality, whoever found it.
+//! - [`QpSolver`] is the trait of all solvers: [`InteriorPoint`], which requires neither heap nor
+//!   `std`; a solver after partial condensing (`Condensing`); and Clarabel (feature `clarabel`).
+//! - [`residuals`] evaluates the optimality conditions at a point, independently of the solver.
 #![cfg_attr(
     feature = "alloc",
     doc = "
@@ -110,12 +109,12 @@ pub use solver::{QpSolver, QpStart};
 pub use stage::{Stage, StageMut};
 pub use statistics::{QpStatistics, Residuals};
 
-// What the optimal control problems write and read.
+// Exports for the optimal control problems.
 pub(crate) use coupling::{is_marked, marked_indices};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{Places, copy_common, padded_len, part, part_mut, take_mut};
+pub(crate) use layout::{StageOffsetsIter, copy_common, padded_len, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
 pub(crate) use memory::{try_reserve, try_resize, zeros};
 #[cfg(feature = "alloc")]

@@ -1,7 +1,9 @@
 //! The data of a QP.
 
 use super::error::{QpError, QpField};
-use super::layout::{Places, StageDims, copy_common, end, exceeds_memory, part, part_mut, take_mut};
+use super::layout::{
+    StageDims, StageOffsetsIter, copy_common, end, exceeds_memory, part, part_mut, take_mut,
+};
 #[cfg(feature = "alloc")]
 use super::memory::CACHE_LINE;
 use super::stage::{ConstraintVector, Stage, StageMut};
@@ -10,14 +12,13 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-/// A quadratic program with the structure of optimal control, over memory of its owner.
+/// A quadratic program with the structure of optimal control, in memory of the caller.
 ///
-/// With the feature `alloc`, `Qp::new(&dims)` has its memory on the heap; elsewhere
-/// [`Qp::in_memory`] takes arrays or static slices of [`Qp::memory`] numbers. See the
-/// [module](super) for the problem.
+/// With the feature `alloc`, `Qp::new(&dims)` allocates its memory; [`Qp::in_memory`] uses arrays
+/// or static slices of [`Qp::memory`] elements. See the [module](super) for the problem.
 ///
-/// A new QP is all zero, without bounds. A state at the start that is given is one whose two bounds
-/// are equal: [`Qp::fix_initial_state`].
+/// A new QP is zero, without bounds. A fixed initial state has two equal bounds:
+/// [`Qp::fix_initial_state`].
 ///
 /// ```
 /// use casados::qp::{HeapQp, StageDims};
@@ -40,10 +41,10 @@ use core::marker::PhantomData;
 pub struct Qp<T, D, M> {
     dims: D,
     memory: M,
-    /// How many numbers the stages take; behind them is a mark for every state and control of the
-    /// first one.
+    /// The length of the data of the stages. A mark for every state and control of the first stage
+    /// follows.
     stages: usize,
-    /// Where a cache line begins: whole registers are read from there on.
+    /// The start of a cache line, from which whole registers are read.
     #[cfg(feature = "alloc")]
     begin: usize,
     number: PhantomData<T>,
@@ -86,25 +87,25 @@ pub type HeapQp<T = f64> = Qp<T, Vec<StageDims>, Vec<T>>;
 pub struct QpView<'a, T> {
     pub(crate) dims: &'a [StageDims],
     pub(super) data: &'a [T],
-    /// Periodic states and shared controls.
+    /// Marks of periodic states and shared controls.
     pub(super) marks: &'a [T],
 }
 
 impl<'a, T: Real> QpView<'a, T> {
-    /// The dimensions of the stages.
+    /// Returns the dimensions of the stages.
     #[must_use]
     pub fn dims(&self) -> &'a [StageDims] {
         self.dims
     }
-    /// A stage.
+    /// Returns a stage.
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<Stage<'a, T>> {
         self.stages().nth(stage)
     }
-    /// All stages, in order.
+    /// Returns all stages in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = Stage<'a, T>> + ExactSizeIterator + use<'a, T> {
         let data = self.data;
-        Places::<T>::new(self.dims)
+        StageOffsetsIter::<T>::new(self.dims)
             .map(move |place| Stage { place, data: part(data, place.data, place.data_len()) })
     }
 }
@@ -127,7 +128,7 @@ impl<T: Real> HeapQp<T> {
 }
 
 impl<T: Real, D, M> Qp<T, D, M> {
-    /// How many numbers the data takes; `usize::MAX` if they are more than that.
+    /// Returns the length of the data; `usize::MAX` if it overflows.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
         if exceeds_memory(dims) { usize::MAX } else { end::<T>(dims).data + coupling_mark_count(dims) }
@@ -135,10 +136,10 @@ impl<T: Real, D, M> Qp<T, D, M> {
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
-    /// A QP in given memory, of at least [`Qp::memory`] numbers.
+    /// A QP in given memory, of at least [`Qp::memory`] elements.
     ///
     /// # Errors
-    /// [`QpError::Dimension`] if there is less, or no stage.
+    /// [`QpError::Dimension`] if the memory is too short, or if there is no stage.
     pub fn in_memory(dims: D, memory: M) -> Result<Self, QpError> {
         let (expected, found) = (Self::memory(dims.as_ref()), memory.as_ref().len());
         if dims.as_ref().is_empty() {
@@ -159,19 +160,19 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         qp.clear();
         Ok(qp)
     }
-    /// All zero, without bounds.
+    /// Resets the data to zero, without bounds.
     pub fn clear(&mut self) {
         let (dims, data) = self.parts_mut();
         clear(dims, data);
     }
-    /// Dimensions and numbers.
+    /// Returns dimensions and numbers.
     fn parts_mut(&mut self) -> (&[StageDims], &mut [T]) {
         let data = self.memory.as_mut();
         #[cfg(feature = "alloc")]
         let data = data.get_mut(self.begin..).unwrap_or_default();
         (self.dims.as_ref(), data)
     }
-    /// For solvers.
+    /// Returns a view for solvers.
     #[must_use]
     pub fn view(&self) -> QpView<'_, T> {
         let (dims, data) = (self.dims.as_ref(), self.memory.as_ref());
@@ -179,34 +180,34 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         let data = data.get(self.begin..).unwrap_or_default();
         QpView { dims, data, marks: part(data, self.stages, coupling_mark_count(dims)) }
     }
-    /// Periodic states and shared controls.
+    /// Returns the marks of periodic states and shared controls.
     pub(super) fn marks_mut(&mut self) -> &mut [T] {
         let stages = self.stages;
         let (dims, data) = self.parts_mut();
         part_mut(data, stages, coupling_mark_count(dims))
     }
-    /// The dimensions of the stages.
+    /// Returns the dimensions of the stages.
     #[must_use]
     pub fn dims(&self) -> &[StageDims] {
         self.dims.as_ref()
     }
-    /// A stage, to be written.
+    /// Returns a mutable stage.
     pub fn stage_mut(&mut self, stage: usize) -> Option<StageMut<'_, T>> {
         let (dims, data) = self.parts_mut();
-        let place = Places::<T>::new(dims).nth(stage)?;
+        let place = StageOffsetsIter::<T>::new(dims).nth(stage)?;
         Some(StageMut { place, data: part_mut(data, place.data, place.data_len()) })
     }
-    /// All stages, in order, to be written.
+    /// Returns all mutable stages in order.
     pub fn stages_mut(&mut self) -> impl Iterator<Item = StageMut<'_, T>> {
         let (dims, data) = self.parts_mut();
         stages_mut(dims, data)
     }
-    /// All numbers.
+    /// Returns all data of the stages.
     #[cfg(feature = "alloc")]
     pub(super) fn data_mut(&mut self) -> &mut [T] {
         self.parts_mut().1
     }
-    /// `x₀`, by two equal bounds of every component, which are hard.
+    /// Fixes the initial state `x₀`, by two equal hard bounds of every component.
     ///
     /// # Errors
     /// [`QpError::Dimension`]
@@ -226,7 +227,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     }
 }
 
-/// States and controls of the first stage.
+/// Returns the number of states and controls of the first stage.
 const fn coupling_mark_count(dims: &[StageDims]) -> usize {
     match dims.first() {
         Some(first) => first.nx + first.nu,
@@ -234,15 +235,16 @@ const fn coupling_mark_count(dims: &[StageDims]) -> usize {
     }
 }
 
-/// All stages, in order, to be written.
+/// Returns all mutable stages in order.
 pub(super) fn stages_mut<'a, T: Real>(
     dims: &'a [StageDims],
     mut data: &'a mut [T],
 ) -> impl Iterator<Item = StageMut<'a, T>> {
-    Places::<T>::new(dims).map(move |place| StageMut { place, data: take_mut(&mut data, place.data_len()) })
+    StageOffsetsIter::<T>::new(dims)
+        .map(move |place| StageMut { place, data: take_mut(&mut data, place.data_len()) })
 }
 
-/// Writes zeros and no bounds.
+/// Resets data to zero, without bounds.
 pub(super) fn clear<T: Real>(dims: &[StageDims], data: &mut [T]) {
     data.fill(T::ZERO);
     let infinity = T::from_f64(f64::INFINITY);

@@ -1,6 +1,6 @@
-//! Work that is shared among threads: each takes the next item when it is free.
+//! A work queue for threads: each thread takes the next item when it is idle.
 
-/// As many threads as there are, but no more than that.
+/// Returns the number of threads, at most `most`.
 pub fn threads(most: usize) -> usize {
     #[cfg(feature = "parallel")]
     return rayon::current_num_threads().min(most).max(1);
@@ -8,8 +8,8 @@ pub fn threads(most: usize) -> usize {
     most.min(1)
 }
 
-/// Does the work on all items, with a worker for each thread. Which worker takes an item depends on
-/// the machine: results may not.
+/// Processes all items, with a worker for each thread. The assignment of items to workers varies
+/// from run to run: results must not depend on it.
 pub fn each<W: Send, I: Iterator<Item: Send> + Send>(
     workers: &mut [W],
     items: I,
@@ -31,7 +31,7 @@ fn on_threads<W: Send, I: Iterator<Item: Send> + Send>(
     work: &(impl Fn(&mut W, I::Item) + Sync),
 ) {
     if let [worker] = workers {
-        // The lock is held for as long as it takes to take an item.
+        // The lock is held only while an item is taken.
         let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
         while let Some(item) = next() {
             work(worker, item);

@@ -1,6 +1,7 @@
-//! How well a point satisfies the conditions of optimality.
+//! Residuals of the optimality conditions at a point.
 //!
-//! Written from the definition of the problem, element by element: independent of every solver.
+//! They are evaluated by the definition of the problem, element by element, independently of all
+//! solvers.
 
 use super::block::Block;
 use super::bounds::Bounds;
@@ -12,12 +13,12 @@ use super::stage::Stage;
 use super::statistics::{Residuals, nan_max, positive};
 use crate::scalar::Real;
 
-/// How well a point satisfies the conditions of optimality of the QP, and its objective with
+/// Returns the residuals of the optimality conditions of the QP at a point, and its objective with
 /// penalties.
 ///
-/// The variables `e` of soft bounds are eliminated: they are the violations, and the multiplier of
-/// a violated soft bound must be `linear + quadratic · e`; of one that is not violated it may be
-/// anything from zero to that.
+/// The variables `e` of soft bounds are eliminated: they are the violations. The multiplier of a
+/// violated soft bound must be `linear + quadratic · e`, that of a satisfied one is between zero
+/// and `linear`.
 ///
 /// ```
 /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims, residuals};
@@ -46,7 +47,7 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
 ) -> (Residuals, f64) {
     let mut result = Residuals::default();
     let mut objective = 0.0;
-    // π_k, and x_{k+1}
+    // `π_k` and `x_{k+1}`
     let mut arriving: &[T] = &[];
     let mut stages = solution.stages().peekable();
     for (k, data) in qp.stages().enumerate() {
@@ -90,21 +91,22 @@ fn update_largest(of: &mut f64, value: f64) {
 fn element_as_f64<T: Real>(vector: &[T], index: usize) -> f64 {
     vector.get(index).map_or(0.0, |v| v.to_f64())
 }
-/// A row times a vector.
+/// Returns a row times a vector.
 fn row<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
     x.iter().enumerate().map(|(j, x)| element(block, row, j).to_f64() * x.to_f64()).sum()
 }
-/// A column times a vector.
+/// Returns a column times a vector.
 fn column<T: Real>(block: &Block<'_, T>, column: usize, y: &[T]) -> f64 {
     y.iter().enumerate().map(|(i, y)| element(block, i, column).to_f64() * y.to_f64()).sum()
 }
-/// A row of a symmetric matrix, of which the lower triangle is there, times a vector.
+/// Returns a row of a symmetric matrix, stored by its lower triangle, times a vector.
 fn symmetric<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
     let lower = |j: usize| element(block, row.max(j), row.min(j)).to_f64();
     x.iter().enumerate().map(|(j, x)| lower(j) * x.to_f64()).sum()
 }
 
-/// The gradient of the Lagrangian in a state, and its part of `½ vᵀ H v + hᵀ v`.
+/// Returns the gradient of the Lagrangian by a state, and the term of the state in
+/// `½ vᵀ H v + hᵀ v`.
 fn state_gradient_and_cost<T: Real>(
     data: &Stage<'_, T>,
     point: &SolutionStage<'_, T>,
@@ -122,7 +124,7 @@ fn state_gradient_and_cost<T: Real>(
     )
 }
 
-/// As [`state_gradient_and_cost`], in a control.
+/// As [`state_gradient_and_cost`], by a control.
 fn control_gradient_and_cost<T: Real>(
     data: &Stage<'_, T>,
     point: &SolutionStage<'_, T>,
@@ -139,7 +141,7 @@ fn control_gradient_and_cost<T: Real>(
     )
 }
 
-/// Whether there are neither bounds nor multipliers: nothing can be wrong with either.
+/// Returns whether there are neither bounds nor multipliers, so that there is nothing to check.
 #[inline(always)]
 fn is_unbounded<T: Real>(bounds: &Bounds<'_, T>, lower: &[T], upper: &[T]) -> bool {
     let infinity = T::from_f64(f64::INFINITY);
@@ -153,7 +155,7 @@ fn is_unbounded<T: Real>(bounds: &Bounds<'_, T>, lower: &[T], upper: &[T]) -> bo
     free
 }
 
-/// Adds to the residuals of bounds, and returns the penalties.
+/// Adds the residuals of bounds, and returns the penalties.
 pub(crate) fn bounds<T: Real>(
     bounds: &Bounds<'_, T>,
     value: impl Fn(usize) -> f64,
@@ -170,7 +172,7 @@ pub(crate) fn bounds<T: Real>(
         let hard = element_as_f64(bounds.lower_linear, i).is_infinite()
             && element_as_f64(bounds.upper_linear, i).is_infinite();
         if hard && element_as_f64(bounds.lower, i) == element_as_f64(bounds.upper, i) {
-            // An equation: its multiplier, the difference of two, has no sign and no slack.
+            // An equation: its multiplier, the difference of two, may have either sign.
             update_largest(&mut residuals.inequalities, value - element_as_f64(bounds.lower, i));
             continue;
         }
@@ -212,7 +214,7 @@ fn element<T: Real>(block: &Block<'_, T>, row: usize, column: usize) -> T {
     block.get(row, column).unwrap_or(T::ZERO)
 }
 
-/// Residuals of variables that are one: sums of gradients, and differences.
+/// Adds the residuals of coupled variables: sums of gradients, and differences.
 fn coupling_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     solution: &Solution<T, D, M>,

@@ -6,7 +6,7 @@ pub use stage::{SolutionStage, SolutionStageMut};
 
 use super::error::{QpError, QpField};
 use super::layout::{
-    Places, StageDims, StageOffsets, end, exceeds_memory, move_to_front, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, end, exceeds_memory, move_to_front, part, part_mut, take_mut,
 };
 use super::problem::QpView;
 use crate::scalar::Real;
@@ -14,8 +14,8 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-/// A point of a QP and its multipliers, over memory of its owner: where solvers begin, and what
-/// they leave.
+/// A point of a QP and its multipliers, in memory of the caller: the start and the result of
+/// solvers.
 ///
 /// Signs: the gradient of the Lagrangian at stage `k` is
 /// `H v + h + [A B]ᵀ π_{k+1} − (π_k, 0) + λ_upper − λ_lower + [C D]ᵀ (λ_upper − λ_lower) = 0`, with
@@ -35,7 +35,7 @@ use core::marker::PhantomData;
 pub struct Solution<T, D, M> {
     dims: D,
     memory: M,
-    /// Of all `v`, of all `π`, and of the multipliers of one side.
+    /// The lengths of all `v`, of all `π`, and of the multipliers of lower (or upper) bounds.
     lengths: [usize; 3],
     number: PhantomData<T>,
 }
@@ -116,7 +116,7 @@ impl<T: Real> HeapSolution<T> {
 }
 
 impl<T: Real, D, M> Solution<T, D, M> {
-    /// How many numbers a solution takes; `usize::MAX` if they are more than that.
+    /// Returns the length of a solution; `usize::MAX` if it overflows.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
         if exceeds_memory(dims) {
@@ -128,18 +128,18 @@ impl<T: Real, D, M> Solution<T, D, M> {
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
-    /// All `v`, and all `π`.
+    /// Returns all `v`, and all `π`.
     pub(crate) fn variables_and_costates(&self) -> (&[T], &[T]) {
         let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
         (part(memory, 0, v), part(memory, v, dynamics))
     }
-    /// All stages, in order.
+    /// Returns all stages in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
         let ([_, _, row], memory) = (self.lengths, self.memory.as_ref());
         let (v, dynamics) = self.variables_and_costates();
         let begin = v.len() + dynamics.len();
         let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
-        Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
+        StageOffsetsIter::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
             x: part(v, p.v, p.nx),
             u: part(v, p.v + p.nx, p.nu),
             dynamics: part(dynamics, p.dynamics, p.next),
@@ -151,7 +151,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
             g_upper: part(upper, p.row + p.ld, p.ng),
         })
     }
-    /// The same, without owning it.
+    /// Returns a borrowed solution.
     pub(crate) fn borrowed(&self) -> Solution<T, &[StageDims], &[T]> {
         Solution {
             dims: self.dims.as_ref(),
@@ -163,10 +163,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, M> {
-    /// A solution in given memory, of at least [`Solution::memory`] numbers.
+    /// A solution in given memory, of at least [`Solution::memory`] elements.
     ///
     /// # Errors
-    /// [`QpError::Dimension`] if there is less.
+    /// [`QpError::Dimension`] if the memory is too short.
     pub fn in_memory(dims: D, mut memory: M) -> Result<Self, QpError> {
         let (expected, found) = (Self::memory(dims.as_ref()), memory.as_ref().len());
         if found < expected {
@@ -176,12 +176,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let StageOffsets { v, dynamics, row, .. } = end::<T>(dims.as_ref());
         Ok(Self { dims, memory, lengths: [v, dynamics, row], number: PhantomData })
     }
-    /// The dimensions of the stages.
+    /// Returns the dimensions of the stages.
     #[must_use]
     pub fn dims(&self) -> &[StageDims] {
         self.dims.as_ref()
     }
-    /// For solvers.
+    /// Returns a view for solvers.
     pub fn view_mut(&mut self) -> SolutionView<'_, T> {
         let ([v, dynamics, row], mut rest) = (self.lengths, self.memory.as_mut());
         SolutionView {
@@ -192,29 +192,29 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             upper: take_mut(&mut rest, row),
         }
     }
-    /// The multipliers of lower and of upper bounds.
+    /// Returns the multipliers of lower and of upper bounds.
     #[cfg(feature = "alloc")]
     pub(super) fn sides(&self) -> [&[T]; 2] {
         let [v, dynamics, row] = self.lengths;
         [0, row].map(|side| part(self.memory.as_ref(), v + dynamics + side, row))
     }
-    /// Everything, and what is padding.
+    /// Returns all numbers, including padding.
     pub(crate) fn all_numbers(&self) -> &[T] {
         self.memory.as_ref()
     }
-    /// Everything of another solution of the same dimensions.
+    /// Copies another solution of the same dimensions.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         super::layout::copy_common(self.memory.as_mut(), other.memory.as_ref());
     }
-    /// Everything as a function of two solutions of the same dimensions.
+    /// Writes every number as a function of those of two solutions of the same dimensions.
     pub(crate) fn combine(&mut self, a: &Self, b: &Self, f: impl Fn(T, T) -> T) {
         let pairs = a.memory.as_ref().iter().zip(b.memory.as_ref());
         for (target, (&a, &b)) in self.memory.as_mut().iter_mut().zip(pairs) {
             *target = f(a, b);
         }
     }
-    /// All multipliers as functions of what they were and those of another solution of the same
-    /// dimensions.
+    /// Updates all multipliers by a function of their values and those of another solution of the
+    /// same dimensions.
     pub(crate) fn update_multipliers(&mut self, other: &Self, f: impl Fn(T, T) -> T) {
         let begin = self.lengths[0];
         let (targets, others) = (self.memory.as_mut(), other.memory.as_ref());
@@ -222,38 +222,38 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             *target = f(*target, other);
         }
     }
-    /// All multipliers.
+    /// Returns all multipliers.
     pub(crate) fn multipliers_mut(&mut self) -> &mut [T] {
         let begin = self.lengths[0];
         self.memory.as_mut().get_mut(begin..).unwrap_or_default()
     }
-    /// A stage.
+    /// Returns a stage.
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {
         self.stages().nth(stage)
     }
-    /// A stage, to be written.
+    /// Returns a mutable stage.
     pub fn stage_mut(&mut self, stage: usize) -> Option<SolutionStageMut<'_, T>> {
-        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
+        let place = StageOffsetsIter::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(self.view_mut().into_stage(place))
     }
-    /// All stages, in order, to be written.
+    /// Calls a function for all mutable stages in order.
     #[cfg(feature = "alloc")]
     pub(crate) fn each_stage_mut(&mut self, mut write: impl FnMut(SolutionStageMut<'_, T>)) {
         let mut view = self.view_mut();
-        for place in Places::<T>::new(view.dims) {
+        for place in StageOffsetsIter::<T>::new(view.dims) {
             write(view.reborrow().into_stage(place));
         }
     }
-    /// Makes states, controls and multipliers zero: a seed to be written.
+    /// Sets states, controls and multipliers to zero, as for a new seed.
     pub fn clear(&mut self) {
         self.memory.as_mut().fill(T::ZERO);
     }
-    /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last
-    /// stages stay as they are. Stages of different dimensions are not shifted into each other.
+    /// Shifts the solution by one stage, as the start for the QP of the next sampling instant. The
+    /// last stages are unchanged. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {
         let SolutionView { dims, v, dynamics, lower, upper } = self.view_mut();
-        let places = Places::<T>::new(dims);
+        let places = StageOffsetsIter::<T>::new(dims);
         for (here, there) in places.clone().zip(places.skip(1)) {
             if (here.nx, here.nu, here.ng) == (there.nx, there.nu, there.ng) {
                 move_to_front(v, there.v, here.v, there.ld);
@@ -291,7 +291,7 @@ impl<'a, T> SolutionView<'a, T> {
             g_upper: take_mut(&mut upper, p.ng),
         }
     }
-    /// Whether it is a solution of such a QP.
+    /// Checks that the dimensions are those of the QP.
     pub(super) fn check_dimensions(&self, qp: QpView<'_, T>) -> Result<(), QpError> {
         let (expected, found) = (qp.dims.len(), self.dims.len());
         if expected != found {
@@ -308,7 +308,7 @@ impl<'a, T> SolutionView<'a, T> {
         }
         Ok(())
     }
-    /// The same view for a shorter time.
+    /// Returns a view with a shorter lifetime.
     pub fn reborrow(&mut self) -> SolutionView<'_, T> {
         let Self { dims, v, dynamics, lower, upper } = self;
         SolutionView { dims, v, dynamics, lower, upper }

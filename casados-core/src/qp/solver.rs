@@ -1,11 +1,11 @@
-//! What every solver does.
+//! The interface of all QP solvers.
 
 use super::error::QpError;
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::statistics::QpStatistics;
 
-/// Where a solver begins.
+/// The start of a solver.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -31,11 +31,11 @@ use super::statistics::QpStatistics;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QpStart {
-    /// Somewhere.
+    /// A cold start, independent of the memory of the solution.
     #[default]
     Cold,
-    /// At the point and multipliers in the memory of the solution: the solution of a similar QP. A
-    /// solver that cannot make use of it begins somewhere.
+    /// The point and multipliers in the memory of the solution, as of a similar QP. Solvers without
+    /// warm starts start cold.
     Warm,
 }
 
@@ -67,8 +67,8 @@ pub enum QpStart {
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
 pub trait QpSolver<T> {
-    /// Solves a QP. The solution is in `solution` afterwards; after an error that comes from the
-    /// run, the best iterate is.
+    /// Solves a QP. Afterwards `solution` has the solution; after an error of the run, the best
+    /// iterate.
     ///
     /// # Errors
     /// [`QpError`]
@@ -81,12 +81,12 @@ pub trait QpSolver<T> {
         self.solve_until(qp, start, solution, &mut || false)
     }
 
-    /// As [`QpSolver::solve`], until the time is over: `over`, a clock or a counter of cycles, is
-    /// asked before each iteration of an interior point. A solver that cannot make use of it takes
-    /// the time that it takes.
+    /// As [`QpSolver::solve`], with a time limit: `over`, a clock or a cycle counter, is called
+    /// before each iteration of an interior point. Solvers without this feature ignore it.
     ///
     /// # Errors
-    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`]; then the solution holds the iterate.
+    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`], after which the solution has the
+    /// iterate.
     ///
     /// # Example
     /// ```
@@ -118,23 +118,23 @@ pub trait QpSolver<T> {
         over: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError>;
 
-    /// Permits residuals up to a tolerance for now, or what its options say if that is more. A
-    /// solver that cannot make use of it solves as well as always.
+    /// Permits residuals up to a tolerance from now on; the tolerance of the options holds if it is
+    /// larger. Solvers without this feature ignore it.
     fn permit(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 
-    /// Requires solutions that are good enough for residuals below a tolerance in the problem whose
-    /// steps they are, which may be less than options say. A solver whose solutions are always
-    /// good enough, or as good as they get, does nothing.
+    /// Requires solutions accurate enough for residuals below a tolerance in the problem whose
+    /// steps they are. It may be below the tolerance of the options. Solvers that are always
+    /// accurate enough, or as accurate as possible, ignore it.
     fn require(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 
-    /// Limits the iterations of each call to come, all attempts in sum, for a caller that has ways
-    /// out of its own: a call ends with [`QpError::Infeasible`] where multipliers are nearly a
-    /// proof, and nobody looks for what cannot be satisfied. With nothing calls are as options say
-    /// again. A solver that cannot make use of it does nothing.
+    /// Limits the iterations of each later call, over all its attempts, for callers with their own
+    /// elastic mode. A call then ends with [`QpError::Infeasible`] if its multipliers are nearly a
+    /// certificate of infeasibility, without locating the violated constraints. `None` restores the
+    /// options. Solvers without this feature ignore it.
     ///
     /// # Example
     /// ```

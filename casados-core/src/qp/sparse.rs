@@ -1,35 +1,35 @@
-//! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then
-//! sides, then cones.
+//! A QP as one sparse problem, `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then
+//! inequalities, then cones.
 
 use super::bounds::Bounds;
 use super::coupling::marked_indices;
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::problem::QpView;
 use super::stage::Stage;
 use alloc::vec::Vec;
 
-/// Where a row comes from.
+/// The origin of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Origin {
-    /// A row of the dynamics: where it lies in the multipliers of the dynamics.
+pub enum RowOrigin {
+    /// A row of the dynamics, by its index in the multipliers of the dynamics.
     Dynamics(usize),
-    /// Two equal bounds: where they lie in vectors over constraints.
+    /// Two equal bounds, by their index in vectors over constraints.
     Equation(usize),
     /// A lower bound.
     Lower(usize),
     /// An upper bound.
     Upper(usize),
-    /// The sign of a violation.
+    /// The sign of a violation variable.
     Sign,
-    /// A periodic state or a shared control, whose multipliers nobody asks for.
+    /// A periodic state or a shared control; its multiplier is not used.
     Coupling,
     /// An element of a cone.
     Cone(usize),
 }
 
-/// Rows `first .. first + count` of the general constraints of a stage, less their lower bounds,
-/// lie in the second-order cone: the first of them is at least the length of the others. Their
-/// upper bounds have no meaning.
+/// A second-order cone: rows `first .. first + count` of the general constraints of a stage, less
+/// their lower bounds; the first row is at least the norm of the others. Upper bounds of these rows
+/// are ignored.
 ///
 /// ```
 /// use casados::qp::*;
@@ -59,13 +59,13 @@ pub enum Origin {
 pub struct SecondOrderCone {
     /// The stage.
     pub stage: usize,
-    /// Its first row.
+    /// The first row.
     pub first: usize,
-    /// How many rows.
+    /// The number of rows.
     pub count: usize,
 }
 
-/// Elements in any order, each column once.
+/// Nonzero elements of a matrix, `(column, row, value)`, in any order without duplicates.
 #[derive(Debug, Default)]
 pub struct Triplets {
     pub elements: Vec<(usize, usize, f64)>,
@@ -82,26 +82,26 @@ impl Triplets {
 /// The sparse problem.
 #[derive(Debug, Default)]
 pub struct Sparse {
-    /// The upper triangle.
+    /// The upper triangle of `P`.
     pub p: Triplets,
     pub q: Vec<f64>,
     pub k: Triplets,
     pub b: Vec<f64>,
-    /// What the rows are.
-    pub origins: Vec<Origin>,
-    /// Columns of the variables `v` of each stage.
+    /// The origins of the rows.
+    pub origins: Vec<RowOrigin>,
+    /// The first column of the variables `v` of each stage.
     pub columns: Vec<usize>,
-    /// How many rows are equations.
+    /// The number of equations.
     pub equations: usize,
-    /// Sizes of cones.
+    /// The sizes of the cones.
     pub cones: Vec<usize>,
 }
 
-/// One row of a stage over its variables, before it has a sign and a right-hand side.
+/// A row of a stage over its variables, without sign and right-hand side.
 struct ConstraintRow<'a> {
     stage: &'a Stage<'a, f64>,
     column: usize,
-    /// A variable, or `n` + a general constraint.
+    /// The index of a variable, or `n` plus that of a general constraint.
     index: usize,
 }
 
@@ -136,7 +136,7 @@ fn row_bounds(bounds: &Bounds<'_, f64>, i: usize) -> Option<RowBounds> {
 }
 
 impl Sparse {
-    /// Of a QP.
+    /// The sparse problem of a QP.
     pub fn new(qp: QpView<'_, f64>, cones: &[SecondOrderCone]) -> Self {
         let mut sparse = Self::default();
         for dims in qp.dims() {
@@ -146,13 +146,13 @@ impl Sparse {
         for (stage, &column) in qp.stages().zip(&sparse.columns) {
             cost(&mut sparse.p, &mut sparse.q, &stage, column);
         }
-        for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
+        for (k, (stage, place)) in qp.stages().zip(StageOffsetsIter::<f64>::new(qp.dims())).enumerate() {
             let (Some(&here), next) = (sparse.columns.get(k), sparse.columns.get(k + 1).copied()) else {
                 break;
             };
             for i in 0..place.next {
                 let row = sparse.row(
-                    Origin::Dynamics(place.dynamics + i),
+                    RowOrigin::Dynamics(place.dynamics + i),
                     -stage.offset().get(i).copied().unwrap_or(0.0),
                 );
                 for j in 0..place.nx {
@@ -165,9 +165,9 @@ impl Sparse {
             }
         }
         sparse.add_coupling_rows(qp);
-        // Equations before inequalities, and these before cones.
+        // Equations precede inequalities, and inequalities cones.
         for pass in 0..2 {
-            for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
+            for (k, (stage, place)) in qp.stages().zip(StageOffsetsIter::<f64>::new(qp.dims())).enumerate() {
                 let Some(&column) = sparse.columns.get(k) else { break };
                 let kinds = [stage.x_bounds(), stage.u_bounds(), stage.g_bounds()];
                 for (index, (bounds, i)) in
@@ -199,10 +199,10 @@ impl Sparse {
             let (Some(stage), Some(&column)) = (qp.stage(cone.stage), sparse.columns.get(cone.stage)) else {
                 continue;
             };
-            let Some(place) = Places::<f64>::new(qp.dims()).nth(cone.stage) else { continue };
+            let Some(place) = StageOffsetsIter::<f64>::new(qp.dims()).nth(cone.stage) else { continue };
             for general in cone.first..cone.first + cone.count {
                 let lower = stage.g_bounds().lower.get(general).copied().unwrap_or(0.0);
-                let row = sparse.row(Origin::Cone(place.row + place.ld + general), -lower);
+                let row = sparse.row(RowOrigin::Cone(place.row + place.ld + general), -lower);
                 ConstraintRow { stage: &stage, column, index: place.n + general }.add(
                     &mut sparse.k,
                     row,
@@ -214,11 +214,11 @@ impl Sparse {
         sparse
     }
 
-    /// Differences of variables that are one.
+    /// Adds the differences of coupled variables.
     fn add_coupling_rows(&mut self, qp: QpView<'_, f64>) {
         let columns = self.columns.clone();
         let mut equal = |first: usize, other: usize| {
-            let row = self.row(Origin::Coupling, 0.0);
+            let row = self.row(RowOrigin::Coupling, 0.0);
             self.k.add(row, first, 1.0);
             self.k.add(row, other, -1.0);
         };
@@ -232,19 +232,19 @@ impl Sparse {
         }
     }
 
-    fn row(&mut self, origin: Origin, b: f64) -> usize {
+    fn row(&mut self, origin: RowOrigin, b: f64) -> usize {
         self.origins.push(origin);
         self.b.push(b);
         self.b.len() - 1
     }
 
-    /// Two sides, or an equation.
+    /// Adds one equation, or the inequalities of a row.
     fn constraint(&mut self, line: &ConstraintRow<'_>, row: usize, limits: &RowBounds, equations: bool) {
         let RowBounds { lower, upper } = limits;
         let hard = lower.1.is_infinite() && upper.1.is_infinite();
         if hard && lower.0 == upper.0 {
             if equations {
-                let k = self.row(Origin::Equation(row), lower.0);
+                let k = self.row(RowOrigin::Equation(row), lower.0);
                 line.add(&mut self.k, k, 1.0);
             }
             return;
@@ -253,7 +253,7 @@ impl Sparse {
             return;
         }
         for (sign, &(bound, linear, quadratic), origin) in
-            [(-1.0, lower, Origin::Lower(row)), (1.0, upper, Origin::Upper(row))]
+            [(-1.0, lower, RowOrigin::Lower(row)), (1.0, upper, RowOrigin::Upper(row))]
         {
             if bound.is_infinite() || (linear == 0.0 && quadratic == 0.0) {
                 continue;
@@ -261,12 +261,12 @@ impl Sparse {
             let k = self.row(origin, sign * bound);
             line.add(&mut self.k, k, sign);
             if linear.is_finite() {
-                // A variable of its own for the violation.
+                // A violation variable.
                 let violation = self.q.len();
                 self.q.push(linear);
                 self.p.add(violation, violation, quadratic);
                 self.k.add(k, violation, -1.0);
-                let k = self.row(Origin::Sign, 0.0);
+                let k = self.row(RowOrigin::Sign, 0.0);
                 self.k.add(k, violation, -1.0);
             }
         }

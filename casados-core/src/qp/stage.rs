@@ -1,4 +1,4 @@
-//! The data of one stage: matrices, vectors and bounds, read or written.
+//! Views of the data of one stage: matrices, vectors and bounds.
 
 use super::block::{Block, BlockMut, MatrixLayout};
 use super::bounds::{Bounds, BoundsMut};
@@ -34,7 +34,7 @@ pub struct Stage<'a, T> {
     pub(super) data: &'a [T],
 }
 
-/// The data of one stage, to be written.
+/// A mutable view of the data of one stage.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -62,7 +62,7 @@ pub struct StageMut<'a, T> {
     pub(super) data: &'a mut [T],
 }
 
-/// What the six vectors over the constraints of a stage are.
+/// The six vectors over the constraints of a stage.
 #[derive(Clone, Copy)]
 pub(super) enum ConstraintVector {
     Lower,
@@ -74,15 +74,15 @@ pub(super) enum ConstraintVector {
 }
 
 impl StageOffsets {
-    /// Begin of the gradient in the data of the stage.
+    /// Returns the offset of the gradient in the data of the stage.
     pub(super) const fn gradient(&self) -> usize {
         self.matrix() + self.hessian()
     }
-    /// Begin of the offset of the dynamics.
+    /// Returns the offset of the constant part of the dynamics.
     pub(super) const fn offset(&self) -> usize {
         self.gradient() + self.ld
     }
-    /// Begin of a vector over constraints.
+    /// Returns the offset of a vector over constraints.
     pub(super) const fn constraint_vector_begin(&self, row: ConstraintVector) -> usize {
         self.offset() + self.ld_next + row as usize * self.rows
     }
@@ -96,12 +96,12 @@ impl StageOffsets {
             QpField::D => (matrix + next * ld + nx, ng, nu, ld, 1),
             QpField::Q => (hessian, nx, nx, 1, ld),
             QpField::R => (hessian + nx * ld + nx, nu, nu, 1, ld),
-            // u's rows left of the diagonal
+            // The rows of `u` below the columns of `x`.
             _ => (hessian + nx, nu, nx, 1, ld),
         };
         (begin, MatrixLayout { field, stage, rows, columns, row, column })
     }
-    /// Where the constraints of a kind begin in vectors over constraints, and how many there are.
+    /// Returns the offset of a kind of constraints in vectors over constraints, and their number.
     pub(super) const fn constraint_range(&self, field: QpField) -> (usize, usize) {
         match field {
             QpField::StateBounds => (0, self.nx),
@@ -109,7 +109,7 @@ impl StageOffsets {
             _ => (self.ld, self.ng),
         }
     }
-    /// What a row is.
+    /// Returns the kind of constraint of a row and its index.
     pub(super) const fn field_of_row(&self, row: usize) -> (QpField, usize) {
         if row < self.nx {
             (QpField::StateBounds, row)
@@ -215,7 +215,7 @@ bounds! {
 }
 
 impl<'a, T: Real> Stage<'a, T> {
-    /// The dimensions.
+    /// Returns the dimensions.
     #[must_use]
     pub fn dims(&self) -> StageDims {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
@@ -223,7 +223,7 @@ impl<'a, T: Real> Stage<'a, T> {
     fn bounds(&self, field: QpField) -> Bounds<'a, T> {
         self.bounds_in_range(self.place.constraint_range(field))
     }
-    /// Those of everything; what is padding is zero.
+    /// Returns the bounds of all rows; the padding is zero.
     pub(crate) fn all_bounds(&self) -> Bounds<'a, T> {
         self.bounds_in_range((0, self.place.rows))
     }
@@ -242,7 +242,7 @@ impl<'a, T: Real> Stage<'a, T> {
 }
 
 impl<T: Real> StageMut<'_, T> {
-    /// The dimensions.
+    /// Returns the dimensions.
     #[must_use]
     pub fn dims(&self) -> StageDims {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
@@ -266,19 +266,20 @@ impl<T: Real> StageMut<'_, T> {
     }
 }
 
-/// The arrays of a stage as they lie in memory: matrices column after column, over `v = (x, u)`.
+/// The arrays of a stage in memory: matrices column after column, over `v = (x, u)`.
 pub(crate) struct Arrays<'a, T> {
     /// `nx + nu`
     pub n: usize,
-    /// The distance of columns.
+    /// The stride of columns.
     pub ld: usize,
-    /// States of the next stage.
+    /// The number of states of the next stage.
     pub next: usize,
-    /// Where general constraints begin in vectors over constraints, and their length.
+    /// The offset of general constraints in vectors over constraints, and the length of these
+    /// vectors.
     pub rows: usize,
     /// `[A B; C D]ᵀ`: a column for each next state, then one for each general constraint.
     pub matrix: &'a mut [T],
-    /// `[Q Sᵀ; S R]`, of which the lower triangle counts.
+    /// `[Q Sᵀ; S R]`; only the lower triangle is read.
     pub hessian: &'a mut [T],
     /// `(q, r)`
     pub gradient: &'a mut [T],
@@ -288,7 +289,7 @@ pub(crate) struct Arrays<'a, T> {
     pub limits: &'a mut [T],
 }
 
-/// Those of them that a point is judged by.
+/// The arrays that residuals depend on.
 pub(crate) struct ArraysRef<'a, T> {
     pub n: usize,
     pub ld: usize,
@@ -300,7 +301,7 @@ pub(crate) struct ArraysRef<'a, T> {
 }
 
 impl<'a, T: Real> Stage<'a, T> {
-    /// The arrays.
+    /// Returns the arrays.
     pub(crate) fn arrays(&self) -> ArraysRef<'a, T> {
         let (p, data) = (self.place, self.data);
         ArraysRef {
@@ -316,7 +317,7 @@ impl<'a, T: Real> Stage<'a, T> {
 }
 
 impl<T: Real> StageMut<'_, T> {
-    /// The arrays.
+    /// Returns the arrays.
     pub(crate) fn arrays(&mut self) -> Arrays<'_, T> {
         let p = self.place;
         let mut rest = &mut *self.data;

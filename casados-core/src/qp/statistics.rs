@@ -1,8 +1,8 @@
-//! What a solver tells about its work.
+//! Statistics of a solve.
 
 use core::fmt;
 
-/// How far a point is from the conditions of optimality: the largest element of each of the four.
+/// Residuals of the optimality conditions: the largest element of each of the four.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -23,18 +23,18 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Residuals {
-    /// Gradient of the Lagrangian.
+    /// The gradient of the Lagrangian.
     pub stationarity: f64,
     /// `A x + B u + b − x₊`
     pub dynamics: f64,
-    /// Violation of bounds and general constraints, and of the signs of multipliers.
+    /// Violations of bounds and general constraints, and of the signs of multipliers.
     pub inequalities: f64,
     /// Products of slacks and multipliers.
     pub complementarity: f64,
 }
 
 impl Residuals {
-    /// The largest of them; NaN if one of them is.
+    /// Returns the largest residual; NaN if one is NaN.
     #[must_use]
     pub fn largest(&self) -> f64 {
         let all = [self.stationarity, self.dynamics, self.inequalities, self.complementarity];
@@ -42,16 +42,16 @@ impl Residuals {
     }
 }
 
-/// The larger of two numbers; NaN if one of them is.
+/// Returns the larger of two numbers; NaN if one is NaN.
 #[inline(always)]
 pub(crate) fn nan_max<T: PartialOrd>(a: T, b: T) -> T {
-    // What is not equal to itself is NaN.
+    // Only NaN differs from itself.
     #[allow(clippy::eq_op)]
     let keeps = b <= a || a != a;
     if keeps { a } else { b }
 }
 
-/// A number, or zero in place of a negative one; NaN stays.
+/// Returns the number, or zero if it is negative; NaN remains NaN.
 #[inline(always)]
 pub(crate) fn positive<T: PartialOrd + Default>(a: T) -> T {
     nan_max(T::default(), a)
@@ -67,7 +67,7 @@ impl fmt::Display for Residuals {
     }
 }
 
-/// What a solution took.
+/// Statistics of a solve.
 ///
 /// ```
 /// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -89,18 +89,17 @@ impl fmt::Display for Residuals {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct QpStatistics {
-    /// Newton's steps with a matrix of their own: active sets, and iterations of the interior
-    /// point.
+    /// Newton steps with a new matrix: active sets, and iterations of the interior point.
     pub iterations: usize,
-    /// How many of them tried an active set.
+    /// Iterations that tried an active set.
     pub active_sets: usize,
     /// Factorisations.
     pub factorisations: usize,
-    /// Solves that corrected a solution for rounding errors and regularisation.
+    /// Solves for iterative refinement, against rounding errors and regularisation.
     pub refinements: usize,
-    /// Pivots that were too small and were made larger.
+    /// Pivots that were too small and were increased.
     pub regularised: usize,
-    /// How well the conditions of optimality hold.
+    /// Residuals of the optimality conditions.
     pub residuals: Residuals,
     /// `½ vᵀ H v + hᵀ v`, with penalties of soft constraints.
     pub objective: f64,

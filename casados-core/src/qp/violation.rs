@@ -1,12 +1,12 @@
-//! What a point violates.
+//! Violations of bounds at a point.
 
 use super::error::{QpError, QpField, Side};
-use super::layout::{Places, StageOffsets, part};
+use super::layout::{StageOffsets, StageOffsetsIter, part};
 use super::problem::QpView;
 use super::stage::ConstraintVector;
 use crate::scalar::Real;
 
-/// A bound, and by how much a point violates it.
+/// A violated bound and its violation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Violation {
     pub field: QpField,
@@ -22,10 +22,9 @@ impl From<Violation> for QpError {
     }
 }
 
-/// The hard bound that a point `v` violates most, in units if there are any, and the sum of all
-/// such violations as they are. Bounds are hard whose linear penalties are infinite: those of lower
-/// and upper bounds of states, controls and general constraints, stage by stage, as `penalties` has
-/// them.
+/// Returns the hard bound with the largest violation at a point `v`, measured in units if there are
+/// any, and the sum of all violations without units. A bound is hard if its linear penalty is
+/// infinite; `penalties` returns the linear penalties of the lower and the upper bound of a row.
 pub(crate) fn largest_violation<T: Real>(
     qp: QpView<'_, T>,
     v: &[T],
@@ -33,7 +32,7 @@ pub(crate) fn largest_violation<T: Real>(
     mut penalties: impl FnMut(&StageOffsets, usize) -> [T; 2],
 ) -> (Option<Violation>, f64) {
     let (mut worst, mut most, mut sum): (Option<Violation>, f64, f64) = (None, 0.0, 0.0);
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let v = part(v, place.v, place.ld);
         for row in (0..place.n).chain(place.ld..place.ld + place.ng) {
@@ -64,7 +63,7 @@ pub(crate) fn largest_violation<T: Real>(
     (worst, sum)
 }
 
-/// The linear penalties of a row.
+/// Returns the linear penalties of a row.
 pub(crate) fn linear_penalties<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, row: usize) -> [T; 2] {
     let data = part(qp.data, place.data, place.data_len());
     [ConstraintVector::LowerLinear, ConstraintVector::UpperLinear]

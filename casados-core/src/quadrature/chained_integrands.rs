@@ -1,4 +1,4 @@
-//! The integrand of one step of many: what it adds up belongs to the whole interval.
+//! Integrands of the steps or parts of an interval, whose sums are those of the whole interval.
 
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
@@ -7,12 +7,12 @@ use crate::model::{ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 
-/// Derivatives by `(x_n, u, p)` become derivatives by `(x₀, u, p)`: `D_i V_n`.
+/// Converts derivatives by `(x_n, u, p)` to derivatives by `(x₀, u, p)`: `D_i V_n`.
 pub(crate) struct ChainRuleIntegrand<'a, M: Dae, T: Real> {
     pub inner: &'a mut dyn Integrand<M, T>,
-    /// `V_n = dx_n/dw`; the identity if there is none.
+    /// `V_n = dx_n/dw`; `None` for the identity.
     pub v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
-    /// Whether second derivatives are wanted.
+    /// Whether to compute second derivatives.
     pub with_hessian: bool,
 }
 
@@ -54,7 +54,7 @@ impl<M: Dae, T: Real> Integrand<M, T> for ChainRuleIntegrand<'_, M, T> {
     }
 }
 
-/// Takes part in adjoints alone: all else was done on the way forth.
+/// An integrand in the adjoint sweep only: the forward sweep has computed everything else.
 pub(crate) struct AdjointOnlyIntegrand<'a, M: Dae, T: Real>(pub &'a mut dyn Integrand<M, T>);
 
 impl<M: Dae, T: Real> sealed::Sealed for AdjointOnlyIntegrand<'_, M, T> {}

@@ -12,17 +12,16 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, plain};
 use bytemuck::Zeroable;
 
-/// `q = ∫ l dt` of the outputs of a function `F`, along the solution of an integrator that takes it
-/// along.
+/// Quadrature `q = ∫ l dt` of the outputs of a function `F` along the solution of an integrator.
 ///
-/// | call of the integrator | what is there afterwards |
+/// | call of the integrator | results |
 /// | --- | --- |
 /// | `solve` | `q` |
 /// | `forward` | `q` and its derivatives |
 /// | `adjoint` | `q`; the gradient is that of `λᵀx + νᵀq` |
 /// | `hessian` | `q` and its derivatives; gradient and Hessian are those of `λᵀx + νᵀq` |
 ///
-/// What a call does not compute is zero after it. After an error the values mean nothing.
+/// Values that a call does not compute are zero. After an error all values are invalid.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -55,7 +54,7 @@ pub struct Quadrature<F: Function, T: Plain = f64> {
     pub dq_du: MatrixYU<F, T>,
     /// `∂q/∂p`
     pub dq_dp: MatrixYP<F, T>,
-    /// `ν`: what the outputs are multiplied by in gradients and Hessians; zero unless it is set.
+    /// Weights `ν` of the outputs in gradients and Hessians; zero by default.
     pub nu: VectorY<F, T>,
     dq: ArrayY<F, ArrayW<F, T>>,
     memory: StageMemory<F, T>,
@@ -70,13 +69,13 @@ impl<F: Function, T: Plain> Default for Quadrature<F, T> {
 }
 
 impl<F: Function, T: Plain> Quadrature<F, T> {
-    /// One that is its own memory.
+    /// Returns a quadrature that contains its memory.
     #[must_use]
     pub fn new() -> Self {
         Self::zeroed()
     }
 
-    /// One on the heap, for models that are large.
+    /// Returns a quadrature on the heap, for large models.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]

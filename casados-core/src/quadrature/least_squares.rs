@@ -1,4 +1,4 @@
-//! Half of the integral of a weighted square, and the matrix of Gauss and Newton.
+//! Half the integral of a weighted square, and its Gauss-Newton matrix.
 
 use super::memory::{ArrayW, StageMemory};
 use super::{Integrand, sealed};
@@ -12,24 +12,24 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
-/// `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F`, along the solution of an integrator that
-/// takes it along.
+/// Quadrature `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F` along the solution of an
+/// integrator.
 ///
 /// ```text
 /// ∇φ = ∫ (dr/dw)ᵀ W r dt        H = ∫ (dr/dw)ᵀ W (dr/dw) dt        w = (x₀, u, p)
 /// ```
 ///
-/// `H` is the Hessian of `φ` without the second derivatives of `r`: the matrix of Gauss and Newton,
+/// `H` is the Gauss-Newton matrix, the Hessian of `φ` without the second derivatives of `r`. It is
 /// positive semidefinite if `W` and the weights `b_i` of the method are.
 ///
-/// | call of the integrator | what is there afterwards |
+/// | call of the integrator | results |
 /// | --- | --- |
 /// | `solve` | `φ` |
 /// | `forward` | `φ`, its gradient, `H` |
-/// | `adjoint` | `φ`; the gradient that is returned is that of `λᵀx + φ` |
-/// | `hessian` | `φ`, its gradient, `H`; gradient and Hessian that are returned are the exact ones of `λᵀx + φ` |
+/// | `adjoint` | `φ`; the returned gradient is that of `λᵀx + φ` |
+/// | `hessian` | `φ`, its gradient, `H`; the returned gradient and Hessian are the exact ones of `λᵀx + φ` |
 ///
-/// What a call does not compute is zero after it. After an error the values mean nothing.
+/// Values that a call does not compute are zero. After an error all values are invalid.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -64,22 +64,22 @@ pub struct LeastSquares<F: Function, T: Plain = f64> {
     pub grad_u: <F::Shape as Shape>::VectorU<T>,
     /// `∂φ/∂p`
     pub grad_p: <F::Shape as Shape>::VectorP<T>,
-    /// `H`, the block of `x₀` and `x₀`.
+    /// Block `(x₀, x₀)` of `H`.
     pub h_xx: <F::Shape as Shape>::MatrixXX<T>,
-    /// `H`, the block of `x₀` and `u`.
+    /// Block `(x₀, u)` of `H`.
     pub h_xu: <F::Shape as Shape>::MatrixXU<T>,
-    /// `H`, the block of `u` and `u`.
+    /// Block `(u, u)` of `H`.
     pub h_uu: <F::Shape as Shape>::MatrixUU<T>,
-    /// `H`, the block of `x₀` and `p`.
+    /// Block `(x₀, p)` of `H`.
     pub h_xp: <F::Shape as Shape>::MatrixXP<T>,
-    /// `H`, the block of `u` and `p`.
+    /// Block `(u, p)` of `H`.
     pub h_up: <F::Shape as Shape>::MatrixUP<T>,
-    /// `H`, the block of `p` and `p`.
+    /// Block `(p, p)` of `H`.
     pub h_pp: <F::Shape as Shape>::MatrixPP<T>,
-    /// `W`, symmetric.
+    /// The symmetric weight matrix `W`.
     pub weights: MatrixYY<F, T>,
     gradient: ArrayW<F, T>,
-    /// `H`, its lower triangle.
+    /// The lower triangle of `H`.
     sum: ArrayW<F, ArrayW<F, T>>,
     row: ArrayW<F, T>,
     memory: StageMemory<F, T>,
@@ -88,13 +88,13 @@ pub struct LeastSquares<F: Function, T: Plain = f64> {
 plain!([F: Function, T: Plain] LeastSquares<F, T> { value, grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp, weights, gradient, sum, row, memory });
 
 impl<F: Function, T: Real> LeastSquares<F, T> {
-    /// One that is its own memory, with the weights `W`, which are symmetric.
+    /// Returns a quadrature that contains its memory, with symmetric weights `W`.
     #[must_use]
     pub fn new(weights: &MatrixYY<F, T>) -> Self {
         Self { weights: *weights, ..Zeroable::zeroed() }
     }
 
-    /// One on the heap, for models that are large.
+    /// Returns a quadrature on the heap, for large models.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -105,7 +105,7 @@ impl<F: Function, T: Real> LeastSquares<F, T> {
         Ok(boxed)
     }
 
-    /// `μ = W r`, and `½ rᵀ W r`.
+    /// Computes `μ = W r`; returns `½ rᵀ W r`.
     fn weigh_residuals(&mut self) -> T {
         let Self { weights, memory: StageMemory { y, mu, .. }, .. } = self;
         let mut square = T::ZERO;
@@ -215,7 +215,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
         mirror_block(&mut self.h_xu, rows, [0, nx]);
         mirror_block(&mut self.h_xp, rows, [0, nx + nu]);
         mirror_block(&mut self.h_up, rows, [nx, nx + nu]);
-        // The exact Hessian has these terms too.
+        // The exact Hessian contains these terms too.
         for (second, row) in self.memory.second.as_mut().iter_mut().zip(rows) {
             axpy(T::ONE, row.as_ref(), second.as_mut());
         }
@@ -228,7 +228,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
     }
 }
 
-/// A block above the diagonal, from the lower triangle.
+/// Writes a block above the diagonal from the lower triangle.
 fn mirror_block<T: Plain, R: AsRef<[T]>, A: Matrix<T>>(
     block: &mut A,
     lower: &[R],

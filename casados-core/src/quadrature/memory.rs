@@ -1,4 +1,4 @@
-//! A function at a stage, and the products of its derivatives with those of its variables.
+//! A function at a stage, and the products of its derivatives with those of the variables.
 
 use super::product::CongruenceUpdate;
 use crate::error::{Error, Place};
@@ -16,7 +16,7 @@ pub(super) type ArrayW<F, T> = <<F as Function>::Shape as Shape>::ArrayW<T>;
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct StageMemory<F: Function, T: Plain> {
-    /// The variables.
+    /// The variables of the model.
     pub v: ArrayV<F, T>,
     /// Their derivatives `D`.
     pub d: ArrayV<F, ArrayW<F, T>>,
@@ -45,6 +45,8 @@ impl<F: Function, T: Real> StageMemory<F, T> {
         }
     }
 
+    /// Evaluates `y`.
+    ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     pub fn evaluate(&mut self, at: Place) -> Result<(), Error> {
@@ -52,7 +54,7 @@ impl<F: Function, T: Real> StageMemory<F, T> {
         self.check_finite(at)
     }
 
-    /// `y` and `dy`.
+    /// Evaluates `y` and `dy`.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -71,7 +73,7 @@ impl<F: Function, T: Real> StageMemory<F, T> {
         self.check_finite(at)
     }
 
-    /// `weight ∇(μᵀy)`
+    /// Computes `weight ∇(μᵀy)`.
     pub fn weighted_gradient(&mut self, weight: T) -> &[T] {
         for mu in self.mu.as_mut() {
             *mu = weight * *mu;
@@ -85,7 +87,7 @@ impl<F: Function, T: Real> StageMemory<F, T> {
         let Self { v, mu, d, hessian, entries, g, second, .. } = self;
         F::hessian::<T>(v, mu, hessian);
         for (entry, value) in entries.as_mut().iter_mut().zip(hessian.as_ref()) {
-            // What is subtracted below.
+            // Negative, since the product below is subtracted.
             *entry = [-(weight * *value)];
         }
         dispatch(CongruenceUpdate {

@@ -1,11 +1,12 @@
-//! Integrals of functions along the solution, with the sensitivities of the integrator.
+//! Quadratures: integrals of functions along the solution, with the sensitivities of the
+//! integrator.
 //!
 //! ```text
 //! q = ∫ l(x, z, u, p, t) dt ≈ Σ_n Σ_i h b_i l_i        l_i = l(ξ_i, z_i, u, p, t_n + c_i h)
 //! ```
 //!
-//! is what the method would give for additional states `q̇ = l`, at the cost of evaluating `l` at
-//! the stages. Its derivatives are exact ones of this sum, with `D_i = d(ξ_i, z_i, u, p)/dw`:
+//! is the result of the method for additional states `q̇ = l`, at the cost of evaluating `l` at the
+//! stages. The derivatives are exact derivatives of this sum, with `D_i = d(ξ_i, z_i, u, p)/dw`:
 //!
 //! ```text
 //! dq/dw = Σ h b_i l_v D_i
@@ -13,17 +14,17 @@
 //! d²(λᵀx + νᵀq)/dw² = Σ D_iᵀ (h b_i ∇²(νᵀl) − ∇²(μ_iᵀ f))_i D_i
 //! ```
 //!
-//! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function); [`LeastSquares`] half
-//! of a weighted square of them, with the matrix of Gauss and Newton. An integrator takes one
-//! along: `irk.with(&mut cost).hessian(...)`.
+//! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function), [`LeastSquares`] half
+//! a weighted square of them, with the Gauss-Newton matrix. An integrator takes an integrand by
+//! `with`: `irk.with(&mut cost).hessian(...)`.
 //!
-//! Integrands are evaluated one stage after the other, and a batch takes none along. An adaptive
-//! integrator chooses its steps for the states, not for the integral. Over intervals with controls
-//! of their own derivatives by all of them are returned beside those of the solution.
+//! Integrands are evaluated stage by stage. Batches do not support them. An adaptive integrator
+//! controls the error of the states, not of the integral. Over several intervals with different
+//! controls, the derivatives by all of them are returned besides those of the solution.
 
-mod integral;
-// What the derive of `Zeroable` writes about a field of type `T`.
 mod chained_integrands;
+mod integral;
+// The derive of `Zeroable` repeats the bounds of `T`.
 #[allow(clippy::multiple_bound_locations)]
 mod least_squares;
 mod memory;
@@ -41,10 +42,10 @@ pub(crate) mod sealed {
     pub trait Sealed {}
 }
 
-/// What an integrator can take along: [`Quadrature`] and [`LeastSquares`].
+/// An integrand of an integrator: [`Quadrature`] and [`LeastSquares`].
 ///
-/// Its methods are for integrators. Those with a body are called on what a user has given alone,
-/// not on what stands for it in one step of many.
+/// Its methods are called by integrators. Provided methods are called on the integrand of the user
+/// only, not on the integrands of single steps.
 ///
 /// ```
 /// use casados::integrator::Integrand;
@@ -79,54 +80,54 @@ pub(crate) mod sealed {
             of the model"
 )]
 pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
-    /// Forgets the last interval.
+    /// Discards the sums of the last interval.
     #[doc(hidden)]
     fn reset(&mut self) {}
-    /// The variables that it depends on.
+    /// Returns the variables on which it depends.
     #[doc(hidden)]
     fn variables(&self) -> &'static [u32];
-    /// A place for the variables at a stage, and one for their derivatives `D`, of which the rows
-    /// of [`Integrand::variables`] count.
+    /// Returns the memory of the variables at a stage, and of their derivatives `D`, of which the
+    /// rows of [`Integrand::variables`] are used.
     #[doc(hidden)]
     fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]);
-    /// Adds the value at the point.
+    /// Adds the value at the stage.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
     fn add_value(&mut self, weight: T, at: Place) -> Result<(), Error>;
-    /// Adds the value at the point and its derivatives; those of second order that `hessian` is
-    /// made of, if they are wanted.
+    /// Adds the value at the stage and its derivatives; with `with_hessian` also those of second
+    /// order for `hessian`.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
     fn add_forward(&mut self, weight: T, with_hessian: bool, at: Place) -> Result<(), Error>;
-    /// The gradient at the point over all variables, times the weight.
+    /// Returns the gradient at the stage by all variables, times the weight.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
     fn weighted_gradient(&mut self, weight: T, at: Place) -> Result<&[T], Error>;
-    /// The lower triangle of the sum of `Dᵀ ∇² D`, if there is one.
+    /// Returns the lower triangle of the sum of `Dᵀ ∇² D`, if it was computed.
     #[doc(hidden)]
     fn hessian_sum(&self) -> Option<&[ArrayW<M, T>]> {
         None
     }
-    /// The gradients that were added up, a row for each output.
+    /// Returns the sums of the gradients, one row per output.
     #[doc(hidden)]
     fn gradients(&self) -> &[ArrayW<M, T>] {
         &[]
     }
-    /// The lower triangle of the matrix of Gauss and Newton that was added up, if there is one.
+    /// Returns the lower triangle of the Gauss-Newton matrix, if it was computed.
     #[doc(hidden)]
     fn gauss_newton_sum(&self) -> Option<&[ArrayW<M, T>]> {
         None
     }
-    /// Forgets derivatives, but no values.
+    /// Discards derivatives, but not values.
     #[doc(hidden)]
     fn reset_derivatives(&mut self) {}
-    /// What is integrated at the point, times multipliers.
+    /// Returns the integrand at the stage, times the multipliers.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -135,8 +136,8 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
         let _ = at;
         Ok(T::ZERO)
     }
-    /// The interval ends `dt = weight · time` later: adds what is integrated at the point times
-    /// `dt` to the gradients.
+    /// Adds the derivative of the integral by the end time: `dt = weight · time`, times the
+    /// integrand at the end.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -145,7 +146,7 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
         let _ = (weight, time, at);
         Ok(())
     }
-    /// Writes the results.
+    /// Computes the results from the sums.
     ///
     /// # Errors
     /// [`Error::Overflow`]
@@ -155,7 +156,7 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     }
 }
 
-/// An integrand, or none.
+/// An optional integrand.
 pub(crate) type OptionalIntegrand<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
 pub(crate) fn reset_integrand<M: Dae, T: Real>(integrand: &mut OptionalIntegrand<'_, '_, M, T>) {
@@ -170,7 +171,7 @@ pub(crate) fn finish_integrand<M: Dae, T: Real>(
     integrand.as_mut().map_or(Ok(()), |integrand| integrand.finish())
 }
 
-/// The same integrand for a while.
+/// Reborrows an optional integrand.
 pub(crate) fn reborrow<'a, M: Dae, T: Real>(
     integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
 ) -> OptionalIntegrand<'a, 'a, M, T> {

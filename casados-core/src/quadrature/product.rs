@@ -5,7 +5,7 @@ use crate::model::Pattern;
 use crate::scalar::Lanes;
 use crate::shape::Array;
 
-/// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
+/// `sum −= Dᵀ H D` at a stage (lower triangle), with `H` given by its lower triangle.
 pub(crate) struct CongruenceUpdate<'a, E, R, const S: usize> {
     pub pattern: Pattern,
     pub nonlinear_variables: &'static [u32],
@@ -36,9 +36,9 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
                 add_scaled_row::<A, E, R>(value, d, row, g, column);
             }
         }
-        // Tiles of the triangle, each over all curved variables while it is in registers. The last
-        // ones lie over those before, and leave out what these have done. Of numbers that are
-        // registers themselves, narrow ones.
+        // Micro-tiles of the triangle, each summed over all nonlinear variables in registers. The
+        // last tiles overlap the preceding ones, and skip the elements that these have computed.
+        // SIMD registers have narrow tiles.
         let wide = const { size_of::<E>() <= 8 };
         let rows = if R::LEN < 4 { 1 } else { 4 };
         let mut row = 0;
@@ -82,8 +82,8 @@ fn add_scaled_row<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from:
     }
 }
 
-/// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be
-/// skipped; above the diagonal it may write what nobody reads.
+/// A micro-tile of `sum −= Dᵀ G` from a row and a column on, without the first `skipped` rows and
+/// columns. Elements above the diagonal may be written, but are never read.
 #[inline(always)]
 fn subtract_tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
     curved: &[u32],

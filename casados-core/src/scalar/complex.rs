@@ -1,11 +1,10 @@
 //! Complex numbers as scalars, for derivatives by the complex step: `f'(a) = Im f(a + ih) / h`,
 //! exact to rounding for `h = 1e-200`.
 //!
-//! Every function is the analytic continuation of the real one from the real axis, in a formula
-//! that loses no digits of a tiny imaginary part and holds far from the axis too. Where a real
-//! function is made of pieces (`abs`, `signum`, `atan2`, `cbrt` and `powf` of negative numbers,
-//! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
-//! complex elementary functions" (1987).
+//! Every function is the analytic continuation of the real one, in a formula that keeps the digits
+//! of a tiny imaginary part and also holds far from the real axis. For piecewise functions (`abs`,
+//! `signum`, `atan2`, `cbrt` and `powf` of negative numbers, comparisons) the real part selects the
+//! piece. Inverse functions follow Kahan, "Branch cuts for complex elementary functions" (1987).
 
 use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
@@ -44,7 +43,7 @@ impl Scalar for Complex64 {
         if self.re == 0.0 && self.im == 0.0 {
             return complex(0.0, self.im);
         }
-        // The sum of like signs first; the other part from √z² = z.
+        // First the sum of like signs; the other part follows from √z² = z.
         let t = (0.5 * (self.re.abs() + f64::hypot(self.re, self.im))).sqrt();
         if self.re >= 0.0 {
             complex(t, self.im / (2.0 * t))
@@ -168,7 +167,7 @@ impl Scalar for Complex64 {
     }
     fn powf(self, other: Self) -> Self {
         if self.re < 0.0 && other.im == 0.0 {
-            // Real for an integer exponent, not defined for another.
+            // Real for an integer exponent, undefined otherwise.
             let exponent = other.re;
             let sign = if exponent % 2.0 == 0.0 {
                 1.0
@@ -207,7 +206,7 @@ impl Scalar for Complex64 {
 mod tests {
     use super::*;
 
-    /// Squares of `1e200` and `1e-200` are not numbers that there are.
+    /// Squares of `1e200` and `1e-200` overflow and underflow.
     #[test]
     fn hypotenuses_neither_overflow_nor_underflow() {
         for scale in [1e-200, 1.0, 1e200] {

@@ -1,8 +1,8 @@
 //! Elementary functions of `f64` for firmware: those of registers, with one number in each.
 //!
-//! No branch depends on the number, as long as an angle is below 1.6 · 10⁶; beyond that there is
-//! `libm`, whose reductions differ in length. So a controller takes the same number of instructions
-//! at every angle. Bounds of errors are those of `lanes/functions/mod.rs`.
+//! No branch depends on the number for angles below 1.6 · 10⁶, so that a controller executes the
+//! same number of instructions at every angle; larger ones use `libm`, whose reductions vary in
+//! length. Bounds of errors are those of `lanes/functions/mod.rs`.
 
 use super::lanes::functions::{self, Call};
 

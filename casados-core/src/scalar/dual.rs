@@ -1,14 +1,14 @@
 //! The dual numbers of `num-dual` as scalars: derivatives of emitted model code by an independent
 //! implementation of the chain rule.
 //!
-//! Functions are those of `num-dual`. Four are composed here, because `num-dual` has none or one
-//! that fails on part of the domain or loses digits:
+//! Functions are those of `num-dual`, except for four, which it lacks, or computes wrongly on a
+//! part of the domain or with a loss of digits:
 //! - `atan2` divides by the larger argument, so that an argument may be zero;
 //! - `hypot` is scaled by the larger argument;
 //! - `powf` with a constant exponent also takes zero and negative bases to integer powers, and
 //!   rounds once (`num-dual` multiplies `a^(n − 3)` by `a³`); with a variable exponent it is
 //!   `exp(b ln a)`;
-//! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
+//! - `powi` of a zero base multiplies: `num-dual` divides by powers of the base.
 
 use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};

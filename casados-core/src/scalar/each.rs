@@ -1,8 +1,7 @@
 //! Loops over indices.
 
-/// A loop over indices from zero on, for kernels: iterators over arrays would be inlined into each
-/// kernel and simplified there again, which takes long to compile. `continue` in its body goes
-/// round for ever.
+/// A loop over indices from zero on, for kernels: iterators over arrays would be inlined and
+/// simplified in each kernel, with long compile times. `continue` in its body loops forever.
 macro_rules! each {
     ($index:ident < $count:expr => $body:block) => {{
         let mut $index = 0;

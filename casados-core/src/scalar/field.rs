@@ -1,11 +1,11 @@
-//! The arithmetic that kernels are made of.
+//! The arithmetic of kernels.
 
 use super::Known;
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What elimination is generic over: numbers that can be added, multiplied, divided, and compared
-/// in size.
+/// Numbers with addition, multiplication, division and comparison of magnitudes: the arithmetic of
+/// eliminations.
 pub trait Field:
     Copy
     + Debug
@@ -16,13 +16,13 @@ pub trait Field:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// The result of a comparison: `bool`, or one per lane.
+    /// The result of a comparison: `bool`, or one for each lane.
     type Mask: Copy;
 
     /// A constant.
     fn from_f64(value: f64) -> Self;
 
-    /// A whole number that is known at run time only: without double precision where this has none.
+    /// An integer known at run time only; without double precision for types that lack it.
     #[inline(always)]
     fn from_whole(value: usize) -> Self {
         Self::from_f64(value as f64)
@@ -34,15 +34,15 @@ pub trait Field:
         Self::from_f64(1.0) / self
     }
 
-    /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
-    /// machine has an instruction for it: elsewhere it is slow.
+    /// `self − a b`, rounded once if the number type supports it. Only for code that has detected
+    /// the instruction: elsewhere it is slow.
     #[inline(always)]
     fn subtract_product(self, a: Self, b: Self) -> Self {
         self - a * b
     }
 
-    /// `target − left · right` of s×s blocks that lie column after column, fused: for
-    /// kernels, as all that asks for [`Known`] instructions.
+    /// `target − left · right` of s×s blocks in column-major order, fused. For kernels, as
+    /// everything that requires [`Known`] instructions.
     #[inline(always)]
     fn subtract_blocks<const S: usize, const WIDE: bool>(
         target: &mut [[Self; S]; S],
@@ -55,7 +55,7 @@ pub trait Field:
         }
     }
 
-    /// `target − block · x` of an s×s block that lies column after column, fused.
+    /// `target − block · x` of an s×s block in column-major order, fused.
     #[inline(always)]
     fn subtract_columns<const S: usize, const WIDE: bool>(
         target: &mut [Self; S],
@@ -83,7 +83,7 @@ pub trait Field:
         }
     }
 
-    /// `target = block`, a register at a time.
+    /// `target = block`, one register at a time.
     #[inline(always)]
     fn write_block<const S: usize, const WIDE: bool>(
         target: &mut [[Self; S]; S],
@@ -93,7 +93,7 @@ pub trait Field:
         *target = *block;
     }
 
-    /// Rows as columns.
+    /// The transposed matrix.
     #[inline(always)]
     fn transposed<const N: usize, const WIDE: bool>(rows: &[[Self; N]; N], _: Known<WIDE>) -> [[Self; N]; N] {
         transposed(rows)
@@ -112,8 +112,8 @@ pub trait Field:
         }
     }
 
-    /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their
-    /// imaginary ones, and of a real number if `N` is odd, fused.
+    /// `target − a b` of `⌊N/2⌋` complex numbers (their real parts, then their imaginary ones) and
+    /// a real number if `N` is odd, fused.
     #[inline(always)]
     fn subtract_complex<const N: usize, const WIDE: bool>(
         target: &mut [Self; N],
@@ -138,11 +138,11 @@ pub trait Field:
 
     /// `if mask { a } else { b }`, lane by lane
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// Whether it holds in any lane.
+    /// Whether any lane is set.
     fn any(mask: Self::Mask) -> bool;
 }
 
-/// `baseⁿ`: squared and multiplied, and of a negative exponent the reciprocal.
+/// `baseⁿ` by square and multiply; the reciprocal for a negative exponent.
 #[inline(always)]
 #[allow(dead_code)] // Single numbers with `std` have a method of their own.
 pub(crate) fn power<F: Field>(base: F, n: i32) -> F {
@@ -159,7 +159,7 @@ pub(crate) fn power<F: Field>(base: F, n: i32) -> F {
     if n < 0 { power.reciprocal() } else { power }
 }
 
-/// `a + b`, rounded, and what rounding left of it: their sum is exact (D. Knuth).
+/// `a + b`, rounded, and its rounding error: their sum is exact (D. Knuth).
 #[inline(always)]
 pub(crate) fn two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
     let sum = a + b;
@@ -168,14 +168,14 @@ pub(crate) fn two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -
     [sum, (a - first) + (b - second)]
 }
 
-/// The same where `a = 0` or `|a| ≥ |b|`, with half of the operations (T. J. Dekker).
+/// As [`two_sum`] for `a = 0` or `|a| ≥ |b|`, with half of the operations (T. J. Dekker).
 #[inline(always)]
 pub(crate) fn fast_two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
     let sum = a + b;
     [sum, b - (sum - a)]
 }
 
-/// Rows as columns.
+/// The transposed matrix.
 #[inline(always)]
 pub(crate) fn transposed<T: Copy, const N: usize>(rows: &[[T; N]; N]) -> [[T; N]; N] {
     let mut columns = *rows;

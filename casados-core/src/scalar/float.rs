@@ -1,7 +1,7 @@
-//! Elementary functions as methods of `f64` where the standard library is not there.
+//! Elementary functions as methods of `f64` without the standard library.
 
-/// In scope in every model function: a model that calls `x.sin()` compiles for firmware as it
-/// stands. With the standard library `f64` has these methods itself, and the trait has none.
+/// In scope in every model function, so that a model that calls `x.sin()` compiles for firmware
+/// without changes. With the standard library `f64` has these methods, and the trait is empty.
 ///
 /// ```
 /// #[allow(unused_imports)] // with `std` they are methods of `f64`
@@ -18,8 +18,8 @@ impl Float for f64 {}
 #[cfg(not(feature = "std"))]
 macro_rules! float {
     ($($name:ident($($argument:ident)?) = $libm:ident),* $(,)?) => {
-        /// In scope in every model function: the methods of `f64` that `core` does not have, so
-        /// that a model that calls `x.sin()` compiles for firmware as it stands.
+        /// In scope in every model function: the methods of `f64` that `core` lacks, so that a
+        /// model that calls `x.sin()` compiles for firmware without changes.
         #[allow(missing_docs)]
         pub trait Float: Copy {
             $(fn $name(self $(, $argument: Self)?) -> Self;)*

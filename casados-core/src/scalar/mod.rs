@@ -1,9 +1,9 @@
-//! The numbers that model code and kernels are generic over.
+//! The number types of model code and kernels.
 //!
-//! - [`Field`]: what can be added, multiplied, divided, and compared in size.
-//! - [`Scalar`]: what models compute with: `f32`, `f64`, registers, duals, complex numbers.
-//! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
-//! - [`Real`]: one real number, which can be compared: what decisions are made on.
+//! - [`Field`]: addition, multiplication, division, and comparison of magnitudes.
+//! - [`Scalar`]: the numbers of models: `f32`, `f64`, registers, duals, complex numbers.
+//! - [`Lanes`]: one or more real numbers, each of which can be read and written.
+//! - [`Real`]: one real number, which can be compared for decisions.
 
 #[cfg(feature = "testing")]
 mod complex;
@@ -39,49 +39,49 @@ pub use tangent::Tangent;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 
-/// Who has one runs where the instructions of fused kernels are: AVX2, FMA, if `WIDE` AVX-512.
+/// A proof that the instructions of fused kernels are available: AVX2, FMA, and AVX-512 if `WIDE`.
 ///
-/// Numbers are computed with in these registers without asking. The crate alone can make one, and
-/// does so in kernels that it entered after detection; so no safe program reaches instructions that
-/// the machine does not have.
+/// With it these registers are used without a check. Only the crate can create one, in kernels
+/// entered after detection: safe programs never execute instructions that the machine lacks.
 #[doc(hidden)]
 #[derive(Clone, Copy)]
 pub struct Known<const WIDE: bool>(());
 
 impl<const WIDE: bool> Known<WIDE> {
-    /// Only for code that runs inside of `linalg::dispatch`, or after detection.
+    /// Only for code inside of `linalg::dispatch`, or after detection.
     #[inline(always)]
     pub(crate) fn assume_detected() -> Self {
         Self(())
     }
 }
 
-/// A piece of straight-line code on scalars of one type.
+/// Straight-line code on scalars of one type.
 pub trait Piece {
-    /// To be `#[inline(always)]`.
+    /// Implementations are `#[inline(always)]`.
     fn run(self);
 }
 
-/// What model code is generic over.
+/// The scalar type of model code.
 ///
 /// Elementary functions have the meaning of the `f64` methods of the same name.
 pub trait Scalar: Field {
-    /// How a number lies in memory: as itself, or, for a register of `N` numbers, as `[f64; N]`.
+    /// The representation in memory: the number itself or, for a register of `N` numbers,
+    /// `[f64; N]`.
     type Cell: Copy + 'static;
 
-    /// A number from memory.
+    /// Loads a number from memory.
     fn load(cell: &Self::Cell) -> Self;
-    /// A number to memory.
+    /// Stores a number to memory.
     fn store(self, cell: &mut Self::Cell);
 
-    /// Runs a piece of code that is compiled for the instructions which this type consists of.
-    /// Never inlined: pieces are long.
+    /// Runs code that is compiled for the instructions of this type. Never inlined, since the code
+    /// is long.
     #[inline(never)]
     fn vectorize<P: Piece>(piece: P) {
         piece.run();
     }
 
-    /// Zeros, made with the fewest instructions outside of [`vectorize`](Scalar::vectorize) too.
+    /// Zeros, created with few instructions even outside of [`vectorize`](Scalar::vectorize).
     #[doc(hidden)]
     #[inline(always)]
     fn zeros<const N: usize>() -> [Self; N] {
@@ -136,9 +136,9 @@ pub trait Scalar: Field {
     fn atanh(self) -> Self;
     /// `√(a² + b²)` without overflow
     fn hypot(self, other: Self) -> Self;
-    /// `a/c`. Where products are fused it is one, with the same bits, since
-    /// [`dae`](https://docs.rs/casados-macros) asks for it only if they are: of the sum `1/c` of
-    /// these two numbers, the larger one rounded towards zero.
+    /// `a/c` for a constant. With fused products it is computed by the sum of these two numbers,
+    /// `1/c` with the larger one rounded towards zero; [`dae`](https://docs.rs/casados-macros)
+    /// emits it only if the result is bitwise equal to the division.
     #[inline(always)]
     fn over(self, c: f64, _reciprocal: [f64; 2]) -> Self {
         self / Self::from_f64(c)
@@ -147,8 +147,8 @@ pub trait Scalar: Field {
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
     fn powf(self, other: Self) -> Self;
-    /// An elementary function of two or four arguments that do not wait for each other: two in one
-    /// register where there is one that is twice as wide, and abreast.
+    /// An elementary function of two or four independent arguments: two in one register if there is
+    /// one twice as wide, and interleaved.
     #[doc(hidden)]
     #[inline(always)]
     fn together<F: elementary::Elementary<K, R>, const K: usize, const R: usize, const N: usize>(
@@ -160,7 +160,7 @@ pub trait Scalar: Field {
         });
         results
     }
-    /// What real parts lead to, each lane by itself: constants, as their derivatives are zero
+    /// Looks up constants by the real parts, for each lane separately; their derivatives are zero
     /// wherever they exist.
     fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C];
     /// `|a|`
@@ -182,15 +182,15 @@ pub trait Scalar: Field {
     fn not(a: Self::Mask) -> Self::Mask;
 }
 
-/// A computation on `S` numbers of type `E` side by side.
+/// A computation on `S` numbers of type `E` in one register.
 pub trait SideBySide<E, const S: usize> {
-    /// With a register of them. To be `#[inline(always)]`.
+    /// Runs it with a register type. Implementations are `#[inline(always)]`.
     fn call<R: Lanes<Cell = [E; S]>>(self);
 }
 
-/// What nobody else can name.
+/// Seals the traits: cannot be named outside of the crate.
 mod sealed {
-    /// Numbers whose alignment tells kernels which registers hold them.
+    /// Numbers whose alignment determines the registers of kernels.
     #[diagnostic::on_unimplemented(
         message = "`{Self}` is a number type of another crate, which kernels cannot compute with",
         note = "integrators and solvers compute with `f64` or `f32`; models compute with every `Scalar`"
@@ -199,40 +199,38 @@ mod sealed {
 }
 pub(crate) use sealed::Sealed;
 
-/// One or more real numbers side by side: `f32`, `f64`, and registers of them.
+/// One or more real numbers: `f32`, `f64`, and registers of them.
 ///
-/// No other type can be one: kernels are entered by the alignment of their numbers, with
-/// instructions that a machine has for these. A number type of one's own is a [`Scalar`], which is
-/// all that models ask for.
+/// Sealed, since kernels select their instructions by the type and alignment of the numbers. Other
+/// number types implement [`Scalar`], which suffices for models.
 pub trait Lanes: Scalar<Cell: Plain> + Plain + Sealed {
-    /// How many.
+    /// The number of lanes.
     const LANES: usize;
     /// The distance from one to the next larger number.
     const EPSILON: f64;
-    /// `ε^(2/3)`: what no longer shrinks below this is a rounding error.
+    /// `ε^(2/3)`: increments below this that no longer shrink are rounding errors.
     const STAGNATION: f64;
-    /// The smallest normal number: where numbers are smaller, rounding errors are not.
+    /// The smallest normal number: rounding errors of smaller numbers do not shrink.
     const SMALLEST: f64;
-    /// As many numbers with half of the digits, where that saves half of the operations: for what
-    /// need not be exact.
+    /// As many numbers with half of the digits, if that halves the operations: for approximate
+    /// computations.
     type Demoted: Lanes;
-    /// Rounded to these, infinite beyond their largest number.
+    /// Rounds to demoted numbers; infinite beyond their largest number.
     fn demote(self) -> Self::Demoted;
-    /// The same numbers.
+    /// Converts demoted numbers without rounding.
     fn promote(demote: Self::Demoted) -> Self;
-    /// One of them. `lane < LANES`
+    /// The number in a lane; `lane < LANES`.
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
-    /// One of them set. `lane < LANES`
+    /// Sets the number in a lane; `lane < LANES`.
     fn set_lane(cell: &mut Self::Cell, lane: usize, value: f64);
 
-    /// Neither infinite nor NaN.
+    /// Whether the numbers are neither infinite nor NaN.
     fn is_finite(self) -> Self::Mask;
-    /// The larger one; `other` if one of them is NaN.
+    /// The larger one; `other` if one is NaN.
     fn max(self, other: Self) -> Self;
     /// Whether a mask is true in every lane.
     fn all(mask: Self::Mask) -> bool;
-    /// The numbers of each lane beside each other, of at most as many registers as there are lanes:
-    /// `to[lane][i] = from[i][lane]`.
+    /// Transposes at most as many registers as there are lanes: `to[lane][i] = from[i][lane]`.
     #[inline(always)]
     fn transpose(from: &[Self], to: &mut [Self::Cell]) {
         for (i, from) in from.iter().enumerate() {
@@ -244,7 +242,7 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain + Sealed {
         }
     }
 
-    /// Runs a computation on `S` numbers like this one in one register.
+    /// Runs a computation on `S` numbers of this type in one register.
     ///
     /// # Errors
     /// The computation, if this machine has no such register.
@@ -261,39 +259,39 @@ pub trait Packed<T>: Lanes {
     fn cells(numbers: &[T]) -> &[Self::Cell];
     /// The whole registers of a slice.
     fn cells_mut(numbers: &mut [T]) -> &mut [Self::Cell];
-    /// `self − a b`, rounded once where the machine has an instruction for it.
+    /// `self − a b`, rounded once if the machine supports it.
     fn minus_product(self, a: Self, b: Self) -> Self;
     /// The sum of the lanes.
     fn total(self) -> T;
-    /// The sum of the lanes of each register, in a lane of its own. There are as many as lanes.
+    /// The sums of the lanes of each register, one per lane; there are as many registers as lanes.
     fn totals(all: &[Self]) -> Self;
-    /// The largest lane; any of them if one is NaN.
+    /// The largest lane; any lane if one is NaN.
     fn largest(self) -> T;
 }
 
-/// A computation on slices that is made in registers of whatever width.
+/// A computation on slices in registers of any width.
 #[doc(hidden)]
 pub trait Registers<T> {
-    /// To be `#[inline(always)]`, with everything that it calls.
+    /// Implementations are `#[inline(always)]`, with everything that they call.
     fn run<E: Packed<T>>(self);
-    /// So many lanes are of use: in a register of twice as many half of them would be padding.
+    /// Returns the number of useful lanes: half of a register of twice as many would be padding.
     fn lanes(&self) -> usize {
         usize::MAX
     }
 }
 
-/// A computation that can be made with any register of numbers of type `T`.
+/// A computation with any register of numbers of type `T`.
 #[doc(hidden)]
 pub trait Widest<T> {
     /// Its result.
     type Output;
-    /// With this one.
+    /// Runs it with a register type.
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
-/// A computation on slices that is compiled with this crate and not in each program again:
-/// [`Real::compiled`] runs it, and the macro `compiled!` makes one. In single precision, which few
-/// programs with `std` need, it is compiled where it is called, as all inlined functions are.
+/// A computation on slices that is compiled once, with this crate: [`Real::run_precompiled`] runs
+/// it, and the macro `compiled!` defines it. In single precision, which few programs with `std`
+/// need, it is compiled by the caller, as all inlined functions are.
 #[doc(hidden)]
 pub trait Compiled {
     /// The computation.
@@ -304,8 +302,8 @@ pub trait Compiled {
     fn single<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f32>);
 }
 
-/// Makes a computation with the lifetimes `'r`, `'a` and `'s` and numbers `T` one that is
-/// [`Compiled`] here. Programs without `std` have it inside, where the optimiser sees all of it.
+/// Defines a [`Compiled`] computation with the lifetimes `'r`, `'a` and `'s` and numbers `T`.
+/// Without `std` it is inlined, so that the optimiser sees all of it.
 macro_rules! compiled {
     ($(#[$text:meta])* $visibility:vis $name:ident: $computation:ty) => {
         $(#[$text])*
@@ -327,7 +325,7 @@ macro_rules! compiled {
 }
 pub(crate) use compiled;
 
-/// One real number: `f32` or `f64`. No other type can be one, as no other can have [`Lanes`].
+/// One real number: `f32` or `f64`. Sealed, as [`Lanes`].
 ///
 /// ```
 /// use casados::Real;
@@ -344,31 +342,31 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + De
     const ZERO: Self;
     /// One.
     const ONE: Self;
-    /// As `f64`, exactly.
+    /// Converts to `f64`, exactly.
     fn to_f64(self) -> f64;
 
-    /// The smaller one; `self` if one of them is NaN.
+    /// The smaller one; `self` if one is NaN.
     #[inline(always)]
     #[must_use]
     fn min(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
 
-    /// Runs a computation of this crate that is compiled for this number type.
+    /// Runs a precompiled computation of this crate.
     #[doc(hidden)]
     fn run_precompiled<'r, 'a: 'r, 's: 'r, C: Compiled>(computation: C::Of<'r, 'a, 's, Self>);
 
-    /// Runs a computation on slices, compiled for the widest registers that this machine has.
+    /// Runs a computation on slices in the widest registers of this machine.
     #[doc(hidden)]
     fn registers<C: Registers<Self>>(computation: C) {
         computation.run::<Self>();
     }
 
-    /// Runs a computation with the widest register of such numbers that this machine has and that
-    /// is no wider than `lanes`; not with those of two numbers where there are any wider ones.
+    /// Runs a computation in the widest register of this machine with at most `lanes` numbers;
+    /// registers of two numbers are skipped if there are wider ones.
     ///
     /// # Errors
-    /// The computation, if there is none.
+    /// The computation, if there is no such register.
     #[doc(hidden)]
     fn run_in_widest_register<C: Widest<Self>>(_lanes: usize, computation: C) -> Result<C::Output, C> {
         Err(computation)

@@ -1,6 +1,6 @@
-//! What numbers that are no registers have in common.
+//! Implementations shared by all number types that are not registers.
 
-/// A number that lies in memory as itself.
+/// A number that is its own cell.
 macro_rules! own_cell {
     () => {
         type Cell = Self;
@@ -16,7 +16,7 @@ macro_rules! own_cell {
 }
 pub(crate) use own_cell;
 
-/// Comparisons of one number have one result: what a [`Field`] does with it.
+/// The mask of a single number is a `bool`: its operations in [`Field`].
 macro_rules! one_mask {
     () => {
         type Mask = bool;
@@ -32,7 +32,7 @@ macro_rules! one_mask {
 }
 pub(crate) use one_mask;
 
-/// What a [`Scalar`] does with it.
+/// The operations of such a mask in [`Scalar`].
 macro_rules! mask_logic {
     () => {
         #[inline(always)]
@@ -51,7 +51,7 @@ macro_rules! mask_logic {
 }
 pub(crate) use mask_logic;
 
-/// Numbers that are their own demoted ones.
+/// Numbers that are their own demoted type.
 macro_rules! as_it_is {
     () => {
         type Demoted = Self;

@@ -5,7 +5,7 @@ use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, mask_log
 #[cfg(not(feature = "std"))]
 use super::{double, field::power, single};
 
-/// The methods of one real type, from `std` where it is there, else from `libm`, `single` and
+/// The methods of one real type, from `std` if available, otherwise from `libm`, `single` and
 /// `double`.
 macro_rules! real {
     ($t:ident, $compiled:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {

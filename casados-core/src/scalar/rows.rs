@@ -1,11 +1,10 @@
-//! Numbers that are looked up.
+//! Constants looked up by numbers.
 
 use super::Real;
 
-/// `C` numbers that `K` others lead to, as constants of a table that depend on the interval in
-/// which a number is.
+/// `C` constants of a table, looked up by the intervals that contain `K` numbers.
 #[doc(hidden)]
 pub trait Rows<const K: usize, const C: usize>: Copy {
-    /// The numbers. To be `#[inline]`.
+    /// The constants. Implementations are `#[inline]`.
     fn row<T: Real>(self, at: [T; K]) -> [T; C];
 }

@@ -1,8 +1,8 @@
-//! Numbers that lie in memory among those of other stages.
+//! Numbers in memory, interleaved with those of other stages.
 //!
-//! A variable has its values at all stages side by side, `[E; S]`. Where no register holds them all
-//! a model is evaluated stage by stage, at the first number of each cell; arrays that begin with
-//! that of another stage make it the others' turn.
+//! The values of a variable at all stages are contiguous, `[E; S]`. If no register holds them, a
+//! model is evaluated stage by stage at the first number of each cell; arrays that start at another
+//! stage evaluate that stage.
 
 use super::lanes::functions::Elementary;
 use super::{Field, Lanes, Piece, Rows, Scalar, Sealed};
@@ -68,7 +68,7 @@ impl<E: Field, const S: usize> Field for Strided<E, S> {
     }
 }
 
-/// Methods that are those of the number.
+/// Methods of the number itself.
 macro_rules! methods {
     (unary: $($unary:ident)*; binary: $($binary:ident)*; compare: $($compare:ident)*; combine: $($combine:ident)*) => {
         $(

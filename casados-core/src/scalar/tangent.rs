@@ -1,9 +1,9 @@
-//! A number with its derivative in one direction: what model code that is generic over the scalar
-//! computes with to give `∂f/∂v v'` beside `f(v)`.
+//! A number with its derivative in one direction: evaluates `∂f/∂v v'` together with `f(v)` by
+//! model code that is generic over the scalar.
 //!
-//! That is more than the product of the Jacobian with `v'`: where terms of an equation cancel, or
-//! those of two equations do, entries of the Jacobian are sums that have rounded what is small
-//! away. Terms that expressions share are rounded once here, and cancel as they should.
+//! This is more accurate than the product of the Jacobian with `v'`: if terms of one or two
+//! equations cancel, entries of the Jacobian are rounded sums that have lost small terms. Here
+//! shared terms are rounded once, and cancel exactly.
 
 use super::{Field, Piece, Rows, Scalar, own_cell};
 use bytemuck::Zeroable;
@@ -20,13 +20,13 @@ pub struct Tangent<S> {
 }
 
 impl<S: Scalar> Tangent<S> {
-    /// `f(a)` with the slope `f'(a)`.
+    /// A function value `f(a)` with the slope `f'(a)`.
     #[inline(always)]
     fn chain(self, value: S, slope: S) -> Self {
         Self { value, derivative: slope * self.derivative }
     }
 
-    /// Without a derivative.
+    /// A number without a derivative.
     #[inline(always)]
     fn constant(value: S) -> Self {
         Self { value, derivative: S::from_f64(0.0) }
@@ -196,8 +196,7 @@ impl<S: Scalar> Scalar for Tangent<S> {
     fn powf(self, other: Self) -> Self {
         let (zero, one) = (constant::<S>(0.0), constant::<S>(1.0));
         let value = self.value.powf(other.value);
-        // Neither a power of zero that is not asked for, nor a logarithm where the exponent is
-        // constant.
+        // Skips powers of zero that are not needed, and the logarithm for a constant exponent.
         let by_base = other.value * self.value.powf(other.value - one) * self.derivative;
         let by_exponent = value * self.value.ln() * other.derivative;
         let by_base = S::select(other.value.eq(zero), zero, by_base);

@@ -3,10 +3,9 @@
 use super::{Array, Matrix, Plain, Shape};
 use nalgebra::{SMatrix, SVector};
 
-/// The number of outputs of a function, and the arrays and matrices it gives beside the dimensions
-/// of a model.
+/// The number of outputs of a function, with the arrays and matrices that depend on it.
 pub trait Outputs: 'static {
-    /// How many.
+    /// Number of outputs.
     const NY: usize;
     /// `[T; NY]`
     type ArrayY<T: Plain>: Array<T>;

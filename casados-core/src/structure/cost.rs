@@ -1,4 +1,4 @@
-//! What a step of an implicit method costs, counted from the structure.
+//! The cost of a step of an implicit method, counted from the structure.
 
 use super::{Kinematic, Structure};
 
@@ -7,9 +7,9 @@ use super::{Kinematic, Structure};
 ///
 /// Blocks are `s×s`. An inverse counts `2s³ − 2s² + s` (Gauss-Jordan elimination in place), a
 /// product of blocks `2s³ − s²`, a product that is subtracted `2s³`, a block times one column
-/// `2s² − s` and subtracted `2s²`. What a machine does beside it (loads, selections in pivoting, a
-/// fused multiply-add that is one instruction) is not in it: costs compare models and methods, they
-/// are no times. Evaluations are zero where operations are not known (dual models).
+/// `2s² − s` and subtracted `2s²`. Machine-specific effects are not included (loads, selections in
+/// pivoting, a fused multiply-add as one instruction): costs compare models and methods, but are no
+/// times. Evaluations are zero if their operations are unknown (dual models).
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -25,40 +25,43 @@ use super::{Kinematic, Structure};
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product
-    /// for each block of its `L`; a subtracted product for each update. Without a plan LU factors
-    /// of the whole matrix of `n = s nk` rows, `n (n − 1)(4n + 1)/6`.
+    /// Factorisation of the Newton matrix: for each pivot that is not the identity an inverse, and
+    /// a product for each block of its `L`; a subtracted product for each update. Without a plan LU
+    /// factorisation of the whole matrix of `n = s nk` rows, `n (n − 1)(4n + 1)/6`.
     pub factorisation: u64,
-    /// A solve with one right-hand side, transposed or not: a subtracted product for each block
-    /// beside the diagonal and a product for each pivot that is no identity. Without a plan
+    /// A solve with one right-hand side, transposed or not: a subtracted product for each
+    /// off-diagonal block, and a product for each pivot that is not the identity. Without a plan
     /// `2n² − n`.
     pub solve: u64,
     /// `f` at all stages: `s` times [`Operations::residual`](super::Operations::residual).
     pub residual: u64,
-    /// `f` and the entries of its Jacobian that are not constant, at all stages.
+    /// `f` and the non-constant entries of its Jacobian, at all stages.
     pub residual_jacobian: u64,
     /// An iteration of Newton's method with a new factorisation: the stage states `ξ`, `2s² nx`;
     /// `f` and its Jacobian; the Newton matrix, `s²` for each entry of `f_x` and `s` for each entry
-    /// that another is added to; factors; a solve; and `s nk` for the new unknowns.
+    /// of `f_ẋ` that is added to one of `f_x`; the factorisation; a solve; and `s nk` for the new
+    /// unknowns.
     pub iteration: u64,
-    /// Forward sensitivities in the directions that count, of [`Structure::directions`]: right-hand
-    /// sides `f_x V + f_w`, `2s` for each entry of `f_x` in each direction and `s` for each of
-    /// `f_u`, `f_p`; a solve for each; `2s² + 3s` for each [`Kinematic`](super::Kinematic) state;
-    /// and `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
+    /// Forward sensitivities in the directions with influence, [`Structure::directions`]:
+    /// right-hand sides `f_x V + f_w`, `2s` for each entry of `f_x` in each direction and `s` for
+    /// each of `f_u`, `f_p`; for each direction a solve, `2s² + 3s` for each
+    /// [`Kinematic`](super::Kinematic) state, and `2s nx` for the sum over the stages. The factors
+    /// are those of Newton's method.
     pub forward: u64,
     /// An adjoint: the right-hand side, `s nx`; a solve; `4s²` for each kinematic state and `2s`
-    /// for each entry by which others depend on it; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
+    /// for each entry by which other equations depend on it; and `2s` for each entry of `f_x`,
+    /// `f_u`, `f_p`.
     pub adjoint: u64,
-    /// Second derivatives, beside forward and adjoint: `∇²(μᵀ f)` at all stages, `D` of the states
-    /// that are curved, `2s²` for each in each direction, and the lower triangle of
-    /// `Dᵀ ∇²(μᵀ f) D`: `4s` for each non-zero (`2s` on the diagonal) in each direction, and `2s`
-    /// for each curved variable in each pair of directions.
+    /// Second derivatives, besides forward and adjoint: `∇²(μᵀ f)` at all stages; `D` of nonlinear
+    /// states, `2s²` for each in each direction; and the lower triangle of `Dᵀ ∇²(μᵀ f) D`, `4s`
+    /// for each off-diagonal nonzero (`2s` on the diagonal) in each direction and `2s` for each
+    /// nonlinear variable in each pair of directions.
     pub hessian: u64,
 }
 
 impl Structure {
-    /// What a step of an implicit method with so many stages costs: see [`Cost`] for what is
-    /// counted.
+    /// Returns the cost of a step of an implicit method with `stages` stages; see [`Cost`] for the
+    /// counting rules.
     ///
     /// ```
     /// # use casados_core::model::Structure;
@@ -83,7 +86,7 @@ impl Structure {
         let (residual, residual_jacobian) =
             (s * u64::from(self.operations.residual), s * u64::from(self.operations.residual_jacobian));
         let shared = (0..self.blocks[1].min(self.jacobian.len())).filter(|&entry| {
-            // An entry of f_ẋ meets one of f_x in the same block.
+            // An entry of f_ẋ in the same block as one of f_x.
             let (row, column) = self.jacobian.at(entry);
             (self.blocks[1]..self.blocks[2])
                 .any(|other| self.jacobian.at(other) == (row, column + self.x.len()))
@@ -107,7 +110,7 @@ impl Structure {
         }
     }
 
-    /// Of a factorisation, and of a solve.
+    /// Costs of a factorisation and of a solve.
     pub(crate) const fn elimination_cost(&self, s: u64) -> (u64, u64) {
         let mut pivots = self.elimination.pivots;
         if pivots.is_empty() {

@@ -1,46 +1,45 @@
-//! Tables that follow from the patterns: where the engine finds things without searching.
+//! Tables derived from the sparsity patterns, so that the engine does not search.
 
 use super::Pattern;
 
 /// No column: see [`Structure::column_of_direction`](super::Structure::column_of_direction).
 pub const NO_COLUMN: u32 = u32::MAX;
 
-/// A term of the product with the symmetric matrix `∇²(μᵀ f)`, of whose values the lower triangle
-/// is known. Rows and columns are positions in [`Structure::curved`](super::Structure::curved).
+/// A term of the product with the symmetric matrix `∇²(μᵀ f)`, whose lower triangle is given. Rows
+/// and columns are positions in [`Structure::curved`](super::Structure::curved).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Term {
     /// The row.
     pub row: u32,
     /// The column.
     pub column: u32,
-    /// Its value, an index into the lower triangle.
+    /// Index of its value in the lower triangle.
     pub entry: u32,
-    /// How many rows, this one among them, have their terms beside each other: they have the same
-    /// columns.
+    /// Number of rows, including this one, whose terms alternate, since they have the same columns.
     pub rows: u32,
 }
 
-/// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has
-/// one element.
+/// The second derivative in a control or a parameter that occurs in no other second derivative. Its
+/// row of `D_i` has one element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagonalControl {
-    /// The entry of the Hessian on its diagonal.
+    /// The diagonal entry of the Hessian.
     pub entry: u32,
     /// The direction.
     pub direction: u32,
 }
 
-/// So many rows at most have their terms beside each other; in firmware memory is dearer than time.
-pub const MOST_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
+/// Maximal number of rows with alternating terms; in firmware memory is scarcer than time.
+pub const MAX_INTERLEAVED_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
 
-/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, of
-/// the `C` variables `curved`: entries of others are left out. Row by row; but rows with the same
-/// columns, as those of the coordinates of a point, go through these together, so that what is
-/// multiplied is fetched once.
+/// Returns all `N` terms of the product with the symmetric matrix whose lower triangle has this
+/// pattern, for the `C` variables `curved`; entries of other variables are omitted. Terms are in
+/// row order, but the terms of rows with the same columns (such as those of the coordinates of a
+/// point) alternate, so that the factor is loaded once.
 #[must_use]
 pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved: &[u32; C]) -> [Term; N] {
     let mut terms = [Term { row: 0, column: 0, entry: 0, rows: 1 }; N];
-    // Where the next term of each row goes.
+    // Position of the next term of each row.
     let mut next = [0; C];
     let mut entry = 0;
     while entry < hessian.len() {
@@ -78,15 +77,15 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     interleave_rows(&terms, &next)
 }
 
-/// Terms row by row, given where each row ends, such that those of rows with the same columns
-/// alternate.
+/// Reorders terms in row order, with the given ends of the rows, so that the terms of rows with the
+/// same columns alternate.
 const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
-    // Rows with the same columns are near each other, if there are any.
+    // Rows with the same columns are searched for among the following rows only.
     const MAX_LOOKAHEAD_ROWS: usize = 8;
     let (mut terms, mut place, mut done, mut row) = (*by_row, 0, [false; C], 0);
     while row < C {
-        let (mut rows, mut count, mut other) = ([row; MOST_ROWS], 0, row);
-        while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MOST_ROWS && !done[row] {
+        let (mut rows, mut count, mut other) = ([row; MAX_INTERLEAVED_ROWS], 0, row);
+        while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MAX_INTERLEAVED_ROWS && !done[row] {
             if !done[other] && have_same_columns(by_row, row_range(ends, row), row_range(ends, other)) {
                 rows[count] = other;
                 count += 1;
@@ -112,7 +111,7 @@ const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], end
     terms
 }
 
-/// Where a row begins and ends.
+/// The first and the last position of a row.
 const fn row_range<const C: usize>(ends: &[usize; C], row: usize) -> [usize; 2] {
     [if row > 0 { ends[row - 1] } else { 0 }, ends[row]]
 }
@@ -129,22 +128,19 @@ const fn have_same_columns(terms: &[Term], [begin, end]: [usize; 2], [other, las
     begin + term == end && other + term == last
 }
 
-/// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each
-/// as they are.
+/// Returns the `N` entries of a Jacobian from `begin` on in column order, stable, for `V` columns.
 #[must_use]
 pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin: usize) -> [u32; N] {
     sort_entries::<V, N, true>(jacobian, begin)
 }
 
-/// The first `N` entries of a Jacobian, by rows, of which there are `R`, and within each as they
-/// are.
+/// Returns the first `N` entries of a Jacobian in row order, stable, for `R` rows.
 #[must_use]
 pub const fn by_row<const R: usize, const N: usize>(jacobian: &Pattern) -> [u32; N] {
     sort_entries::<R, N, false>(jacobian, 0)
 }
 
-/// Entries by columns, or else by rows, of which there are `K`: counted first, so that each goes to
-/// its place at once.
+/// Counting sort of entries by columns or rows, of which there are `K`.
 const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
     jacobian: &Pattern,
     begin: usize,
@@ -170,14 +166,14 @@ const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
     entries
 }
 
-/// The column of an entry, or else its row.
+/// The column of an entry, or its row.
 const fn sort_key<const COLUMN: bool>(jacobian: &Pattern, entry: usize) -> usize {
     let (row, column) = jacobian.at(entry);
     if COLUMN { column } else { row }
 }
 
-/// Where each of `N − 1` rows begins among entries that are given by rows, and where the last one
-/// ends.
+/// Returns the start of each of `N − 1` rows among entries in row order, and the end of the last
+/// row.
 #[must_use]
 pub const fn begins<const N: usize>(jacobian: &Pattern, by_row: &[u32]) -> [u32; N] {
     let (mut begins, mut place, mut row) = ([0; N], 0, 0);
@@ -191,7 +187,7 @@ pub const fn begins<const N: usize>(jacobian: &Pattern, by_row: &[u32]) -> [u32;
     begins
 }
 
-/// For each of `N` directions its position among those that count, or [`NO_COLUMN`].
+/// Returns the position of each of `N` directions among those with influence, or [`NO_COLUMN`].
 #[must_use]
 pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {
     let mut columns = [NO_COLUMN; N];
@@ -203,7 +199,7 @@ pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {
     columns
 }
 
-/// Where a number is in an ascending list that has it.
+/// The position of a number in an ascending list that contains it.
 const fn position_in<const C: usize>(list: &[u32; C], number: usize) -> Option<usize> {
     let (mut low, mut high) = (0, C);
     while low + 1 < high {
@@ -233,13 +229,12 @@ mod tests {
 
     #[test]
     fn rows_with_the_same_columns_alternate() {
-        // All of the first four with each other, and the last one, between which no other row is,
-        // with itself.
+        // All pairs of the first four, and the last one with itself; it is adjacent to them.
         let hessian =
             Pattern { rows: &[0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 4], columns: &[0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 4] };
         let terms = symmetric::<5, 17>(&hessian, &[0, 1, 2, 3, 4]);
         let row_of = |first: usize| terms[first..].iter().map(|term| term.row);
-        if MOST_ROWS == 1 {
+        if MAX_INTERLEAVED_ROWS == 1 {
             assert!(row_of(0).is_sorted());
             return;
         }
@@ -256,13 +251,13 @@ mod tests {
 
     #[test]
     fn entries_sorted_by_columns_and_by_rows() {
-        // Two blocks, each by row: (0, 4), (2, 3), (2, 4), and (0, 6), (2, 5), (2, 6).
+        // Two blocks, each in row order: (0, 4), (2, 3), (2, 4), and (0, 6), (2, 5), (2, 6).
         let jacobian = Pattern { rows: &[0, 2, 2, 0, 2, 2], columns: &[4, 3, 4, 6, 5, 6] };
         assert_eq!(by_column::<7, 6>(&jacobian, 0), [1, 0, 2, 4, 3, 5]);
         assert_eq!(by_column::<7, 3>(&jacobian, 3), [4, 3, 5]);
         let by_row = by_row::<3, 6>(&jacobian);
         assert_eq!(by_row, [0, 3, 1, 2, 4, 5]);
-        // Nothing is in the second row.
+        // The second row is empty.
         assert_eq!(begins::<4>(&jacobian, &by_row), [0, 2, 2, 6]);
     }
 

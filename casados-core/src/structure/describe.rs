@@ -1,22 +1,21 @@
-//! A model describes itself: the text of a [`Structure`].
+//! The text description of a [`Structure`].
 
 use super::{Cost, Elimination, Kinematic, Structure};
 use core::fmt::{self, Display, Formatter, Write};
 
-/// Columns of the text.
+/// Number of columns of the text.
 const WIDTH: usize = 96;
-/// Where the words of a line begin.
+/// Indentation of the words of a line.
 const INDENT: usize = 15;
-/// More words than this of one list are not written.
+/// Maximal number of words of a list.
 const MAX_WORDS: usize = 64;
 /// Numbers of stages for which the cost is listed.
 const LISTED_STAGES: [usize; 4] = [1, 2, 3, 4];
 
-/// Dimensions and names, equations by kind, counts of operations, sparsity, the elimination order,
-/// and the expected cost of a step: for a reader who wants to know what the library has found in a
-/// model.
+/// Dimensions and names, equations by kind, operation counts, sparsity, the elimination order, and
+/// the expected cost of a step.
 ///
-/// Equations are counted from 0; long lists are cut.
+/// Equations are counted from 0; long lists are truncated.
 impl Display for Structure {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let kind = match (self.is_explicit(), self.z.len()) {
@@ -43,7 +42,7 @@ impl Display for Structure {
 }
 
 impl Structure {
-    /// The name of a variable `(ẋ, x, z, u, p, t)` by its index.
+    /// Returns the name of a variable `(ẋ, x, z, u, p, t)` by its index.
     #[must_use]
     pub fn variable(&self, index: u32) -> impl Display {
         let nx = self.x.len();
@@ -61,7 +60,7 @@ impl Structure {
         VariableName { name: "t", derivative: false }
     }
 
-    /// The name of an unknown `(k, z)` by its index: a derivative or an algebraic state.
+    /// Returns the name of an unknown `(k, z)` by its index: a derivative or an algebraic state.
     #[must_use]
     pub fn unknown(&self, index: u32) -> impl Display {
         let nx = self.x.len() as u32;
@@ -239,7 +238,7 @@ impl<N: Display> Display for Assignment<N> {
     }
 }
 
-/// Numbers that follow each other; before them how many there are, after them what they are.
+/// A word in a list of numbers: their count, a number or a range, or a note.
 enum NumberRange {
     Count(usize),
     Numbers(u32, u32),
@@ -257,7 +256,7 @@ impl Display for NumberRange {
     }
 }
 
-/// Ascending numbers, in runs.
+/// Ascending numbers, grouped into runs.
 struct Ranges<I: Iterator<Item = u32>>(core::iter::Peekable<I>);
 
 impl<I: Iterator<Item = u32>> Iterator for Ranges<I> {
@@ -272,7 +271,7 @@ impl<I: Iterator<Item = u32>> Iterator for Ranges<I> {
     }
 }
 
-/// Counts characters: nothing is allocated to find out how long a word is.
+/// Counts characters, so that the length of a word is found without allocation.
 struct CharacterCount(usize);
 
 impl Write for CharacterCount {
@@ -293,7 +292,7 @@ fn fmt_names(f: &mut Formatter<'_>, title: &str, names: &[&str]) -> fmt::Result 
     fmt_words(f, title, [NameRun::Count(names.len())].into_iter().chain(NameRuns(names)))
 }
 
-/// How many there are, one of them, or several whose indices follow each other.
+/// A word in a list of names: their count, a name, or a range of indices.
 enum NameRun<'a> {
     Count(usize),
     Name(&'a str),
@@ -310,7 +309,7 @@ impl Display for NameRun<'_> {
     }
 }
 
-/// Names, with `x[0] .. x[9]` in the place of more than three.
+/// Names, with ranges such as `x[0] .. x[9]` for more than three.
 struct NameRuns<'a>(&'a [&'a str]);
 
 impl<'a> Iterator for NameRuns<'a> {
@@ -341,7 +340,7 @@ fn split_index(name: &str) -> Option<(&str, u32)> {
     Some((head, index.parse().ok()?))
 }
 
-/// A title and words beside it, in lines; many are cut.
+/// Writes a title and words in lines; long lists are truncated.
 fn fmt_words<W: Display>(f: &mut Formatter<'_>, title: &str, words: impl Iterator<Item = W>) -> fmt::Result {
     self::fmt_title(f, title)?;
     let mut column = INDENT;

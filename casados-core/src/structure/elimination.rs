@@ -1,37 +1,38 @@
-//! The plan by which the Newton matrix is eliminated.
+//! The plan of the elimination of the Newton matrix.
 
-/// The order in which the Newton matrix is eliminated, with everything that follows from it and the
+/// The elimination order of the Newton matrix, with all data that follow from it and the sparsity
 /// pattern.
 ///
-/// Made by the macro from the pattern of `f_ẋ ∪ f_x ∪ f_z` and from the values of the model at
-/// sample points; the entries are s×s blocks, so that it serves every tableau. A *slot* is an
-/// unknown `(k, z)` and the equation that is its pivot.
+/// The macro computes it from the pattern of `f_ẋ ∪ f_x ∪ f_z` and from the values of the model at
+/// sample points. Entries are s×s blocks, so that one plan serves every tableau. A *slot* is an
+/// unknown `(k, z)` and the equation that is its pivot row.
 #[derive(Clone, Copy, Debug)]
 pub struct Elimination {
-    /// The pivots in order.
+    /// The pivots in elimination order.
     /// Read by factorisation and substitution.
     pub pivots: &'static [Pivot],
-    /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its
-    /// unknown.
+    /// For each block the slot of its other index: for `L` that of its equation, for `U` that of
+    /// its unknown.
     /// Read by substitution.
     pub slots: &'static [u32],
     /// For each pivot the blocks of `L` in its row.
     /// Read by substitution, row by row.
     pub left: &'static [Left],
-    /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is
-    /// updated.
+    /// For each pivot, for each block of its `L`, for each block of its `U`: the updated block.
     /// Read by factorisation.
     pub updates: &'static [Update],
-    /// What blocks are made of before elimination, those of a kind one after the other, fill first.
+    /// The terms of the blocks before elimination, grouped by kind, fill-in first.
     /// Read by the assembly of Newton matrices.
     pub assembly: &'static [Assembly],
-    /// For each equation its slot; of a [kinematic](Kinematic) state its own.
+    /// For each equation its slot; an equation of a [kinematic](Kinematic) state has the slot of
+    /// the state.
     /// Read where right-hand sides are written.
     pub slot_of_equation: &'static [u32],
     /// The pivots, supernode by supernode.
     /// Read by substitution of several columns.
     pub supernodes: &'static [Supernode],
-    /// For each state whether it is kinematic, and what it follows from; empty if none is.
+    /// For each state whether it is kinematic, with its equation and velocity; empty without
+    /// kinematic states.
     /// Read by the reconstruction of kinematic states.
     pub kinematic: &'static [Kinematic],
     /// The entries of `f_ẋ` and `f_x` by which other equations depend on kinematic states, state by
@@ -41,7 +42,7 @@ pub struct Elimination {
 }
 
 impl Elimination {
-    /// No plan: the matrix is eliminated as a dense one.
+    /// No plan: the dense fallback eliminates the whole matrix.
     pub const NONE: Self = Self {
         pivots: &[],
         slots: &[],
@@ -60,7 +61,7 @@ impl Elimination {
         !self.pivots.is_empty()
     }
 
-    /// How many blocks are fill.
+    /// Returns the number of blocks of fill-in.
     #[must_use]
     pub const fn fill(&self) -> usize {
         let mut count = 0;
@@ -70,7 +71,7 @@ impl Elimination {
         count
     }
 
-    /// How many products of `s×s` blocks the updates of a factorisation cost.
+    /// Returns the number of products of `s×s` blocks in the updates of a factorisation.
     pub(crate) const fn block_product_count(&self) -> f64 {
         let (mut products, mut index) = (0.0, 0);
         while index < self.pivots.len() {
@@ -84,28 +85,28 @@ impl Elimination {
     }
 }
 
-/// A pivot: the blocks that it owns lie one after the other, itself, its column `L`, its row `U`.
+/// A pivot. Its blocks are adjacent: the pivot block, its column of `L`, its row of `U`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pivot {
-    /// The unknown that it determines.
+    /// Slot of its unknown.
     pub slot: u32,
-    /// The equation that determines it.
+    /// Its equation.
     pub equation: u32,
-    /// Its own block.
+    /// Index of the pivot block.
     pub block: u32,
-    /// Where the blocks of its row begin.
+    /// Index of the first block of its row of `U`.
     pub upper: u32,
-    /// Where the blocks of its row end.
+    /// Index after the last block of its row of `U`.
     pub end: u32,
-    /// Where in [`Elimination::left`] the blocks of `L` in its row begin, and where they end.
+    /// Range of the blocks of `L` in its row, in [`Elimination::left`].
     pub left: [u32; 2],
-    /// The pivot is the identity, whatever the step size and the point.
+    /// Whether the pivot is the identity for every step size and point.
     pub identity: bool,
 }
 
 /// A kinematic state `q`, with an equation `q̇ − c v = 0` where `v` is a state that is not
-/// kinematic itself, a control or a parameter. It is no unknown of any elimination: its derivatives
-/// at the stages are
+/// kinematic itself, a control or a parameter. It is condensed, no unknown of the elimination: its
+/// derivatives at the stages are
 ///
 /// ```text
 /// k_q = c (x_v + hA k_v)        or        k_q = c v
@@ -124,38 +125,37 @@ pub struct Kinematic {
 }
 
 impl Kinematic {
-    /// The state is not kinematic.
+    /// Marks a state that is not kinematic.
     pub const NONE: u32 = u32::MAX;
 }
 
-/// An entry of `f_ẋ` or `f_x` by which an equation depends on a kinematic state that is not
-/// determined by it.
+/// An entry of `f_ẋ` or `f_x` of a kinematic state in an equation that is not its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dependent {
     /// The entry.
     pub entry: u32,
     /// The state.
     pub state: u32,
-    /// It is the first one of the state.
+    /// Whether it is the first entry of the state.
     pub first: bool,
-    /// It is the last one.
+    /// Whether it is the last entry of the state.
     pub last: bool,
 }
 
 impl Pivot {
-    /// The blocks of its column, below it.
+    /// Returns the range of the blocks of its column, below it.
     #[must_use]
     #[inline(always)]
     pub const fn lower(&self) -> core::ops::Range<usize> {
         self.block as usize + 1..self.upper as usize
     }
-    /// The blocks of `L` in its row, in [`Elimination::left`].
+    /// Returns the range of the blocks of `L` in its row, in [`Elimination::left`].
     #[must_use]
     #[inline(always)]
     pub const fn left(&self) -> core::ops::Range<usize> {
         self.left[0] as usize..self.left[1] as usize
     }
-    /// The blocks of its row, to the right of it.
+    /// Returns the range of the blocks of its row, to the right of it.
     #[must_use]
     #[inline(always)]
     pub const fn upper(&self) -> core::ops::Range<usize> {
@@ -163,31 +163,31 @@ impl Pivot {
     }
 }
 
-/// Pivots one after the other, four at most, that have the same rows below them and the same
-/// columns beside them but for themselves, and whose rows have the same blocks of `L`.
+/// Consecutive pivots, at most four, with the same rows below them and the same columns beside them
+/// (except for themselves), whose rows have the same blocks of `L`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supernode {
-    /// The first of them.
+    /// Index of its first pivot.
     pub first: u32,
-    /// How many they are.
+    /// Number of its pivots.
     pub count: u32,
 }
 
-/// A block of `L`, as it is met in its row.
+/// A block of `L` in the list of its row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Left {
-    /// The block.
+    /// Index of the block.
     pub block: u32,
-    /// The slot of the pivot whose column it is in.
+    /// Slot of the pivot of its column.
     pub slot: u32,
 }
 
 /// A block that is updated by the product of two others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Update {
-    /// The block.
+    /// Index of the block.
     pub block: u32,
-    /// Nothing is there before: the block is fill, and this is its first update.
+    /// Whether the block is fill-in and this is its first update: it has no value before.
     pub first: bool,
 }
 
@@ -195,17 +195,17 @@ pub struct Update {
 /// `f` of the Jacobian at all stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assembly {
-    /// The block.
+    /// Index of the block.
     pub block: u32,
-    /// The entry `f`, or [`Assembly::NONE`]: the block is fill.
+    /// The entry `f`, or [`Assembly::NONE`] for fill-in.
     pub entry: u32,
-    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state; or
-    /// [`Assembly::NONE`] of one.
+    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state, otherwise
+    /// [`Assembly::NONE`]: then `c = 1`.
     pub by: u32,
-    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more for those that
-    /// multiply a kinematic state.
+    /// Power of `hA`: zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, plus one if the
+    /// entry multiplies a kinematic state.
     pub order: u32,
-    /// It is the first term of its block: those of lower order come first.
+    /// Whether it is the first term of its block; terms of lower order come first.
     pub first: bool,
 }
 
@@ -213,7 +213,7 @@ impl Assembly {
     /// No entry.
     pub const NONE: u32 = u32::MAX;
 
-    /// Whether elimination alone puts anything there.
+    /// Whether the block is fill-in.
     #[must_use]
     pub const fn is_fill(&self) -> bool {
         self.entry == Self::NONE

@@ -1,14 +1,14 @@
-//! Which models are explicit.
+//! Detection of explicit models.
 
 use super::{Pattern, Structure};
 
-/// So many words have a bit for each state.
+/// Number of words of the bit set of states.
 const MAX_STATE_WORDS: usize = 64;
 
 impl Structure {
-    /// Whether every equation has one derivative of its own, with a constant coefficient, and there
-    /// are no algebraic states. Of models with more than 4096 states this is seen only where the
-    /// equations have the order of the states.
+    /// Whether the model is explicit: every equation has one derivative of its own, with a constant
+    /// coefficient, and there are no algebraic states. Models with more than 4096 states are
+    /// recognised only if their equations have the order of the states.
     ///
     /// The first entries of the Jacobian are then those of `f_ẋ`, one for each equation.
     #[must_use]
@@ -18,18 +18,18 @@ impl Structure {
         if !known || !self.z.is_empty() || self.blocks[1] != nx {
             return false;
         }
-        // The derivatives that were met.
-        let mut met = [0_u64; MAX_STATE_WORDS];
+        // Bit set of the derivatives that have occurred.
+        let mut seen = [0_u64; MAX_STATE_WORDS];
         let mut row = 0;
         while row < nx {
             let column = columns[row] as usize;
             let (word, bit) = (column / 64, 1_u64 << (column % 64));
-            let first = if word < MAX_STATE_WORDS { met[word] & bit == 0 } else { column == row };
+            let first = if word < MAX_STATE_WORDS { seen[word] & bit == 0 } else { column == row };
             if rows[row] as usize != row || !self.constant[row] || !first {
                 return false;
             }
             if word < MAX_STATE_WORDS {
-                met[word] |= bit;
+                seen[word] |= bit;
             }
             row += 1;
         }

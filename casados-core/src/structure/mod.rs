@@ -1,5 +1,4 @@
-//! What is known about a model before it runs: facts that the macro found in its graph, as
-//! constants.
+//! Structural facts about a model, which the macro derives from its expression graph, as constants.
 
 mod cost;
 mod curvature;
@@ -11,18 +10,19 @@ mod units;
 
 pub use cost::Cost;
 pub use curvature::{
-    DiagonalControl, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric,
+    DiagonalControl, MAX_INTERLEAVED_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric,
 };
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 pub use reduction::Reduction;
 pub use units::Units;
 
-/// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
+/// Whether a name denotes a variable: `u` denotes `u[0]`, `u[1]`, and `cart` denotes
+/// `cart.position`.
 pub(crate) fn name_matches(name: &str, variable: &str) -> bool {
     variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
 }
 
-/// What is known about a model before it runs.
+/// Structural facts about a model, known at compile time.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -50,86 +50,85 @@ pub struct Structure {
     pub u: &'static [&'static str],
     /// Names of the parameters.
     pub p: &'static [&'static str],
-    /// Non-zeros of the Jacobian: equation, variable. In order of the blocks
+    /// Structural nonzeros of the Jacobian: equation, variable. In order of the blocks
     /// `f_ẋ, f_x, f_z, f_u, f_p`, within each by row, then by column.
-    /// Read by everything that meets entries of the Jacobian.
+    /// Read wherever entries of the Jacobian are used.
     pub jacobian: Pattern,
-    /// Where each of the five blocks begins in `jacobian`, and its end.
+    /// The first entry of each of the five blocks in `jacobian`, and the end of the last.
     /// Read with `jacobian`.
     pub blocks: [usize; 6],
-    /// The entries of `f_x, f_z, f_u, f_p`, column by column: what [`by_column`] makes of them.
+    /// The entries of `f_x, f_z, f_u, f_p`, column by column, by [`by_column`].
     /// Read by right-hand sides of derivatives.
     pub by_column: &'static [u32],
-    /// Entries of the Jacobian that are constant.
+    /// Whether each entry of the Jacobian is constant.
     /// Read by [`is_explicit`](Self::is_explicit), [`Dae::describe`](crate::Dae::describe) and
-    /// pictures.
+    /// plots.
     pub constant: &'static [bool],
-    /// Non-zeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.
-    /// Read by second derivatives of one stage.
+    /// Structural nonzeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.
+    /// Read by second derivatives at a stage.
     pub hessian: Pattern,
-    /// Equations that are linear in `(ẋ, x, z, u, p)` jointly: they have no second derivatives.
+    /// Whether each equation is jointly linear in `(ẋ, x, z, u, p)`, without second derivatives.
     /// Read by [`Dae::describe`](crate::Dae::describe).
     pub linear: &'static [bool],
-    /// The entries of `f_ẋ`, `f_x` and `f_z` do not depend on `(ẋ, x, z)`; on `u`, `p` and `t` they
-    /// may. The residual is then affine in the stages' unknowns: one iteration of Newton's method
-    /// is exact.
+    /// Whether the entries of `f_ẋ`, `f_x` and `f_z` are independent of `(ẋ, x, z)`; they may
+    /// depend on `u`, `p` and `t`. The residual is then affine in the unknowns of the stages, and
+    /// one iteration of Newton's method is exact.
     /// Read by Newton's method.
     pub linear_in_state: bool,
-    /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an
-    /// interval but with the size of the steps. One factorisation then serves all steps of an
-    /// interval, and all intervals of the same `u` and `p`.
+    /// Whether they are independent of `t` too: the Newton matrix then depends on the step size,
+    /// `u` and `p` only. One factorisation serves all steps of an interval, and all intervals with
+    /// the same `u` and `p`.
     /// Read by the Jacobian update policy.
     pub constant_matrix: bool,
-    /// Nothing depends on `t`: stages at the same point have the same values.
+    /// Whether the model is independent of `t`: stages at the same point have the same values.
     /// Read by initial guesses.
     pub autonomous: bool,
-    /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton
-    /// matrix depend on the step size and the tableau only, and one exact iteration of Newton's
-    /// method satisfies these equations to rounding.
+    /// Whether the entries of each equation in `f_ẋ`, `f_x` and `f_z` are constant. Such rows of
+    /// the Newton matrix depend on the step size and the tableau only, and one exact iteration of
+    /// Newton's method satisfies these equations to rounding.
     /// Read by [`Dae::describe`](crate::Dae::describe) and by checks of a model.
     pub constant_rows: &'static [bool],
     /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable
-    /// but a derivative, or none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the
+    /// except a derivative, or absent: `q̇ = v`. They can be solved for `k_j` explicitly at any
     /// point. Ascending.
     /// Read by [`Dae::describe`](crate::Dae::describe).
     pub trivial: &'static [u32],
-    /// States that influence nobody: no equation depends on `x_j`, only on `ẋ_j`. Their columns of
-    /// the Newton matrix are `f_ẋ` alone, their columns of `dk/dx₀` are zero, and their multipliers
-    /// pass through an interval unchanged. Ascending.
+    /// Quadrature states: no equation depends on `x_j`, only on `ẋ_j`. Their columns of the Newton
+    /// matrix are those of `f_ẋ`, their columns of `dk/dx₀` are zero, and their adjoints are
+    /// constant in an interval. Ascending.
     /// Read by [`Dae::describe`](crate::Dae::describe).
     pub quadratures: &'static [u32],
-    /// Directions `w = (x₀, u, p)` that an equation depends on, as indices into `w`, ascending. For
-    /// the others the stages have no derivative: the column of `dx₊/dw` is `e_j` for the state `j`
-    /// and zero for a control or a parameter, and rows and columns of second derivatives are zero.
+    /// Directions with influence: elements of `w = (x₀, u, p)` on which an equation depends, as
+    /// ascending indices. Stages do not depend on the others: their column of `dx₊/dw` is `e_j` for
+    /// the state `j` and zero for a control or a parameter, and rows and columns of second
+    /// derivatives are zero.
     /// Read by the forward sweep and by second derivatives: their columns.
     pub directions: &'static [u32],
-    /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of
-    /// them.
+    /// For each direction its position in `directions`, or [`NO_COLUMN`]; by [`columns`].
     /// Read where results are written.
     pub column_of_direction: &'static [u32],
-    /// Variables that occur in the pattern of the Hessian, ascending, less those of
-    /// `diagonal_controls`: only their rows of `D_i` enter second derivatives. Read by second
-    /// derivatives: their stage sensitivities.
+    /// Nonlinear variables: those in the pattern of the Hessian, except `diagonal_controls`,
+    /// ascending. Only their rows of `D_i` enter second derivatives.
+    /// Read by second derivatives: their stage sensitivities.
     pub curved: &'static [u32],
-    /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`]
-    /// makes of it.
+    /// The terms of the symmetric matrix whose lower triangle is `hessian`, by [`symmetric`].
     /// Read by the product of the Hessian with stage sensitivities.
     pub symmetric: &'static [Term],
-    /// Controls and parameters that occur in the Hessian's diagonal only.
+    /// Controls and parameters that occur only on the diagonal of the Hessian.
     /// Read by second derivatives: sums on the diagonal.
     pub diagonal_controls: &'static [DiagonalControl],
     /// Numbers of arithmetic operations.
     /// Read by [`Structure::cost`] and the Jacobian update policy.
     pub operations: Operations,
-    /// How the Newton matrix is eliminated.
+    /// The plan of the elimination of the Newton matrix.
     /// Read by `linalg`.
     pub elimination: Elimination,
-    /// What was differentiated, where the macro reduced the index.
+    /// The index reduction of the macro, if there was one.
     /// Read by [`Dae::describe`](crate::Dae::describe).
     pub reduction: Option<&'static Reduction>,
 }
 
-/// Positions of structural non-zeros, in the order of their values.
+/// Positions of structural nonzeros, in the order of their values.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -171,8 +170,8 @@ impl Pattern {
         (self.rows[entry] as usize, self.columns[entry] as usize)
     }
 
-    /// `(row, column)` of an entry, if there is one: without a panic where the compiler does not
-    /// know that.
+    /// `(row, column)` of an entry, if it exists; without a panic for indices that the compiler
+    /// does not know.
     #[must_use]
     #[inline(always)]
     pub fn get(&self, entry: usize) -> Option<(usize, usize)> {
@@ -185,8 +184,8 @@ impl Pattern {
     }
 }
 
-/// Numbers of arithmetic operations of one evaluation; an elementary function counts as one.
-/// Zero where it is not known (dual models).
+/// Numbers of arithmetic operations of one evaluation; an elementary function counts as one. Zero
+/// if unknown (dual models).
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -203,7 +202,7 @@ impl Pattern {
 pub struct Operations {
     /// `f`
     pub residual: u32,
-    /// `f` and the entries of its Jacobian that are not constant
+    /// `f` and the non-constant entries of its Jacobian
     pub residual_jacobian: u32,
     /// `∇(μᵀ f)`
     pub adjoint: u32,
@@ -211,7 +210,7 @@ pub struct Operations {
     pub hessian: u32,
 }
 
-/// `0, 1, ..., N − 1`: the directions or variables of a model of which nothing better is known.
+/// `0, 1, ..., N − 1`: all directions or variables, for models of unknown structure.
 #[must_use]
 pub const fn all<const N: usize>() -> [u32; N] {
     let mut numbers = [0; N];

@@ -1,24 +1,25 @@
-//! What `#[dae(index_reduction)]` did.
+//! The index reduction by `#[dae(index_reduction)]`.
 
 use super::describe::fmt_title;
 use core::fmt::{self, Display, Formatter};
 
 /// Equations that were differentiated in time until the model had index 1.
 ///
-/// Equation `i` stood for the constraint `g(x, p, t) = 0`. Differentiated `c` times it determines
-/// derivatives or algebraic states; `g` and its derivatives below `c` are invariants: the outputs
-/// of [`Constrained::Invariants`](crate::Constrained::Invariants), in the order of
+/// Equation `i` was the constraint `g(x, p, t) = 0`. Its derivative of order `c` determines
+/// derivatives or algebraic states; `g` and its derivatives of lower order are invariants: the
+/// outputs of [`Constrained::Invariants`](crate::Constrained::Invariants), in the order of
 /// `differentiated`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reduction {
-    /// The equations, and how often each was differentiated.
+    /// The equations, and the number of differentiations of each.
     pub differentiated: &'static [(u32, u32)],
-    /// The rates `r_m` of Baumgarte's stabilisation, in 1 over the unit of time: the equations are
-    /// `Π_m (d/dt + r_m) g = 0`. None without stabilisation.
+    /// The rates `r_m` of Baumgarte stabilisation, in 1 / unit of time: the equations are
+    /// `Π_m (d/dt + r_m) g = 0`. Empty without stabilisation.
     pub rates: &'static [f64],
-    /// Whether the equations of the projection onto the invariants are known.
+    /// Whether the macro generated the equations of the projection onto the invariants.
     pub projection: bool,
-    /// At how many sample points the matrix `∂f/∂(ẋ, z)` is singular, and how many there are.
+    /// Number of sample points at which the matrix `∂f/∂(ẋ, z)` is singular, and number of all
+    /// sample points.
     pub singular: [u32; 2],
 }
 
@@ -29,7 +30,7 @@ impl Reduction {
         self.differentiated.iter().map(|&(_, times)| times as usize).sum()
     }
 
-    /// The equation that an invariant comes from, and which derivative of it that is.
+    /// Returns the equation of an invariant, and the order of its derivative.
     #[must_use]
     pub fn invariant(&self, mut output: usize) -> Option<(u32, u32)> {
         for &(equation, times) in self.differentiated {
@@ -45,7 +46,7 @@ impl Reduction {
 impl Display for Reduction {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         fmt_title(f, "reduced")?;
-        // Neighbours that were differentiated as often are one entry.
+        // Adjacent equations with the same number of differentiations are one entry.
         let alike = |a: &(u32, u32), b: &(u32, u32)| b.0 == a.0 + 1 && b.1 == a.1;
         for (place, run) in self.differentiated.chunk_by(alike).enumerate() {
             let (first, times) = run[0];

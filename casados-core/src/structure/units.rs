@@ -1,13 +1,13 @@
 //! Units of the variables of a model.
 
-/// The unit of each variable of a model, of states, algebraic states, controls and parameters, and
-/// of the time, as the doc comments say: axes of pictures have it. A list is empty where no unit of
-/// it is known, and so is the text of a variable without one.
+/// The units of the variables of a model (states, algebraic states, controls, parameters) and of
+/// the time, from doc comments; plots show them at their axes. A list is empty if all its units are
+/// unknown; the text of a variable without unit is empty.
 ///
-/// `#[dae]`, `#[ode]` and `#[function]` take the unit from what stands behind a comma, in the first
-/// paragraph of a field's doc comment, or in a list in the model's, which begins with names of
-/// variables. Products and quotients of powers of units of the SI are units, with `L`, `bar`, `eV`,
-/// `min`, `h`, `d`, `°`, `deg`, `°C`, `rpm`, `ha`, `%` and `‰`.
+/// `#[dae]`, `#[ode]` and `#[function]` read a unit after the comma in the first paragraph of a
+/// field's doc comment, or in a list in the model's doc comment that begins with names of
+/// variables. Units are products and quotients of powers of SI units, with `L`, `bar`, `eV`, `min`,
+/// `h`, `d`, `°`, `deg`, `°C`, `rpm`, `ha`, `%` and `‰`.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -43,6 +43,6 @@ pub struct Units {
 }
 
 impl Units {
-    /// No unit is known.
+    /// No units.
     pub const NONE: Self = Self { x: &[], z: &[], u: &[], p: &[], t: "" };
 }

@@ -1,14 +1,14 @@
-//! Which order a tableau has: order conditions of rooted trees, and the simplifying assumptions.
+//! The order of a tableau: order conditions of rooted trees, and simplifying assumptions.
 //!
 //! J. C. Butcher, Implicit Runge-Kutta processes, Math. Comp. 18 (1964); E. Hairer, S. P. Nørsett,
 //! G. Wanner, Solving Ordinary Differential Equations I, sections II.2 and II.7.
 
 use super::{Tableau, TableauError};
 
-/// Trees up to this order are checked: 1205 of them up to order 10, milliseconds.
+/// Maximal order of the trees that are checked: 1205 trees, in milliseconds.
 const MAX_TREE_ORDER: usize = 10;
 
-/// A sum with the sum of the absolute values of its terms, which scales its rounding error.
+/// A sum, and the sum of the absolute values of its terms, which scales its rounding error.
 #[derive(Clone, Copy)]
 struct TreeSum {
     value: f64,
@@ -25,7 +25,7 @@ impl TreeSum {
         })
     }
 
-    /// Equal to `exact`, if every term carries at most `roundings` relative errors of `ε`.
+    /// Whether it equals `exact`, if every term carries at most `roundings` relative errors of `ε`.
     fn equals_to_rounding(self, exact: f64, roundings: usize) -> bool {
         let scale = self.absolute + exact.abs();
         (self.value - exact).abs() <= roundings as f64 * f64::EPSILON * scale
@@ -54,8 +54,8 @@ impl<const S: usize> Tableau<S> {
         }
     }
 
-    /// The order: by trees as far as they are checked, beyond that by `B(p), C(q), D(r)` with
-    /// `p ≤ q + r + 1` and `p ≤ 2q + 2`.
+    /// Returns the order: from order conditions up to `MAX_TREE_ORDER`, beyond that from
+    /// `B(p), C(q), D(r)` with `p ≤ q + r + 1` and `p ≤ 2q + 2`.
     pub(super) fn computed_order(&self) -> usize {
         let by_trees = (1..=MAX_TREE_ORDER).take_while(|&n| self.satisfies_trees(n)).count();
         if by_trees < MAX_TREE_ORDER {
@@ -98,7 +98,7 @@ impl<const S: usize> Tableau<S> {
                 let sum = TreeSum::of_terms(
                     (0..S).map(|i| self.b[i] * integer_power(self.c[i], k - 1) * self.a[i][j]),
                 );
-                // The right-hand side cancels: its rounding error has the scale of b_j / k.
+                // The right-hand side cancels: its rounding error scales with b_j / k.
                 let exact = self.b[j] * (1.0 - integer_power(self.c[j], k)) / k as f64;
                 let scaled = TreeSum { absolute: sum.absolute + self.b[j].abs() / k as f64, ..sum };
                 scaled.equals_to_rounding(exact, S + 2 * k + 1)
@@ -124,8 +124,9 @@ impl<const S: usize> Tableau<S> {
 
     /// The elementary weight `Σ_i b_i Φ_i(t)` and the density `γ(t)`.
     fn elementary_weight(&self, tree: &Tree) -> (TreeSum, f64) {
-        // Of the nodes at each level that wait for their parent: the product of their vectors A Φ,
-        // and the number of nodes below it. Reversed, a node comes after all its descendants.
+        // For each level the product of the vectors A Φ of the nodes that wait for their parent,
+        // and the number of nodes below. In reverse preorder a node comes after all its
+        // descendants.
         let mut product = [[TreeSum::UNIT_SUM; S]; MAX_TREE_ORDER + 1];
         let mut size = [0usize; MAX_TREE_ORDER + 1];
         let mut density = 1.0;
@@ -152,7 +153,7 @@ fn weighted_row_sum<const S: usize>(row: &[f64; S], phi: &[TreeSum; S]) -> TreeS
     })
 }
 
-/// `baseⁿ`, without the elementary functions that `no_std` lacks.
+/// `baseⁿ`, without the elementary functions, which `no_std` does not have.
 fn integer_power(base: f64, n: usize) -> f64 {
     (0..n).fold(1.0, |product, _| product * base)
 }
@@ -170,8 +171,8 @@ impl Tree {
         Self { levels: core::array::from_fn(|i| i), nodes }
     }
 
-    /// The next one, if there is one. T. Beyer, S. M. Hedetniemi, Constant time generation of
-    /// rooted trees, SIAM J. Comput. 9 (1980).
+    /// Moves to the next tree, if there is one. T. Beyer, S. M. Hedetniemi, Constant time
+    /// generation of rooted trees, SIAM J. Comput. 9 (1980).
     fn next_tree(&mut self) -> bool {
         let levels = &mut self.levels;
         let Some(p) = (1..self.nodes).rev().find(|&i| levels[i] > 1) else { return false };

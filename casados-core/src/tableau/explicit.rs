@@ -70,9 +70,9 @@ impl Method<4> for Rk4 {
 
 /// The method of Dormand and Prince with six stages, order 5.
 ///
-/// The seventh stage of the published pair has weight zero: it serves error estimates, and is left
-/// out. J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl.
-/// Math. 6 (1980).
+/// The seventh stage of the published pair, for error estimates, has weight zero and is omitted. J.
+/// R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6
+/// (1980).
 ///
 /// ```
 /// use casados::{DormandPrince5, Method};

@@ -13,7 +13,7 @@ fn lagrange_polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
     product
 }
 
-// On slices, so that they are compiled once for all numbers of stages.
+// Functions on slices are compiled once for all numbers of stages.
 
 /// See [`Tableau::lagrange`].
 #[cfg_attr(feature = "std", inline(never))]

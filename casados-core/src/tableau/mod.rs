@@ -1,4 +1,4 @@
-//! Butcher tableaux, as data with their properties.
+//! Butcher tableaux and their properties.
 //!
 //! One step of a Runge-Kutta method with `S` stages:
 //!
@@ -7,9 +7,9 @@
 //! x_{n+1} = x_n + h Σ_i b_i k_i
 //! ```
 //!
-//! A method is a type that names a tableau ([`Method`]): [`Gauss`], [`RadauIIA`], [`Rk4`], ...; or
-//! [`Custom`], whose tableau is made by [`Tableau::new`] and given to the integrator when it is
-//! built.
+//! A method is a type with a tableau ([`Method`]): [`Gauss`], [`RadauIIA`], [`Rk4`], ...; or
+//! [`Custom`], whose tableau is created by [`Tableau::new`] and passed to the constructor of the
+//! integrator.
 
 mod conditions;
 mod explicit;
@@ -43,7 +43,7 @@ pub trait Method<const S: usize>: 'static {
     const TABLEAU: Tableau<S>;
 }
 
-/// A method with `S` stages whose [`Tableau`] is given when the integrator is built.
+/// A method with `S` stages whose [`Tableau`] is passed to the constructor of the integrator.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -87,7 +87,7 @@ pub struct Tableau<const S: usize> {
 }
 
 impl<const S: usize> Tableau<S> {
-    /// A published tableau with its published orders; tests check them.
+    /// A published tableau with its published orders, which tests check.
     const fn published(
         name: &'static str,
         order: usize,
@@ -99,12 +99,12 @@ impl<const S: usize> Tableau<S> {
         Self { name, order, stage_order, a, b, c }
     }
 
-    /// A tableau of the user's own. Its orders are computed.
+    /// Returns a user-defined tableau. Its orders are computed.
     ///
     /// # Errors
     /// [`TableauError`] if `S = 0`, if a coefficient is not finite, or if `c_i = Σ_j a_ij` or
-    /// `Σ_i b_i = 1` is violated by more than coefficients that are rounded once to `f64` explain,
-    /// which is `(S + 1) ε` times the sum of the absolute values. Write `1.0 / 3.0`, not `0.3333`.
+    /// `Σ_i b_i = 1` is violated by more than the rounding of coefficients to `f64`: `(S + 1) ε`
+    /// times the sum of the absolute values. Write `1.0 / 3.0`, not `0.3333`.
     pub fn new(a: [[f64; S]; S], b: [f64; S], c: [f64; S]) -> Result<Self, TableauError> {
         let mut tableau = Self { name: "custom", order: 0, stage_order: 0, a, b, c };
         tableau.check()?;
@@ -113,7 +113,7 @@ impl<const S: usize> Tableau<S> {
         Ok(tableau)
     }
 
-    /// The same tableau under another name.
+    /// Returns the tableau with another name.
     #[must_use]
     pub const fn named(mut self, name: &'static str) -> Self {
         self.name = name;
@@ -125,7 +125,7 @@ impl<const S: usize> Tableau<S> {
     pub const fn name(&self) -> &'static str {
         self.name
     }
-    /// `a_ij`, row by row.
+    /// `a_ij`, in row-major order.
     #[must_use]
     pub const fn a(&self) -> &[[f64; S]; S] {
         &self.a
@@ -140,8 +140,9 @@ impl<const S: usize> Tableau<S> {
     pub const fn c(&self) -> &[f64; S] {
         &self.c
     }
-    /// Order of convergence for ordinary differential equations. For a tableau of the user's own it
-    /// is exact up to 10, above that what the simplifying assumptions `B`, `C`, `D` prove.
+    /// Order of convergence for ordinary differential equations. For a user-defined tableau it is
+    /// exact up to 10; above that it is the order that the simplifying assumptions `B`, `C`, `D`
+    /// guarantee.
     #[must_use]
     pub const fn order(&self) -> usize {
         self.order
@@ -152,13 +153,13 @@ impl<const S: usize> Tableau<S> {
         self.stage_order
     }
 
-    /// `a_ij = 0` for `j ≥ i`: stages are computed one after the other.
+    /// Whether `a_ij = 0` for `j ≥ i`: stages are computed one after the other.
     #[must_use]
     pub const fn is_explicit(&self) -> bool {
         self.first_implicit_stage().is_none()
     }
 
-    /// The first stage that needs itself or a later one.
+    /// Returns the first stage that depends on itself or a later one.
     pub(crate) const fn first_implicit_stage(&self) -> Option<usize> {
         let mut i = 0;
         while i < S {
@@ -174,7 +175,7 @@ impl<const S: usize> Tableau<S> {
         None
     }
 
-    /// The last stage is the end of the step: `a_si = b_i`.
+    /// Whether the last stage is the end of the step: `a_si = b_i`.
     #[must_use]
     pub const fn is_stiffly_accurate(&self) -> bool {
         let mut j = 0;
@@ -187,7 +188,8 @@ impl<const S: usize> Tableau<S> {
         S > 0
     }
 
-    /// Whether quadratic invariants are kept: `b_i a_ij + b_j a_ji = b_i b_j` to rounding.
+    /// Whether the method preserves quadratic invariants: `b_i a_ij + b_j a_ji = b_i b_j` to
+    /// rounding.
     #[must_use]
     pub const fn is_symplectic(&self) -> bool {
         let (a, b) = (&self.a, &self.b);
@@ -196,7 +198,7 @@ impl<const S: usize> Tableau<S> {
             let mut j = 0;
             while j <= i {
                 let (p, q, r) = (b[i] * a[i][j], b[j] * a[j][i], b[i] * b[j]);
-                // Each product carries the rounding of two factors and its own.
+                // Each product carries the rounding errors of two factors and its own.
                 let bound = 2.0 * f64::EPSILON * (p.abs() + q.abs() + r.abs());
                 if (p + q - r).abs() > bound {
                     return false;
@@ -227,7 +229,7 @@ impl<const S: usize> Tableau<S> {
     }
 }
 
-/// Why a user's own tableau was refused.
+/// The reason why a user-defined tableau is invalid.
 ///
 /// ```
 /// # use casados::{Tableau, TableauError};
@@ -246,7 +248,7 @@ pub enum TableauError {
     NotFinite,
     /// `c_i ≠ Σ_j a_ij`
     RowSum {
-        /// The stage `i`, from 0.
+        /// Index `i` of the stage, from 0.
         stage: usize,
         /// `Σ_j a_ij`
         sum: f64,

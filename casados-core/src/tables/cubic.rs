@@ -3,9 +3,9 @@
 use super::points::check_slopes;
 use crate::scalar::Scalar;
 
-/// The weights with which a derivative of a cubic piece is made of `[f₀, f₁, f₀′, f₁′]`: of order
-/// zero, with `s = (x − x₀)/h` and `r = 1 − s`, they are
-/// `[r² (1 + 2s), s² (3 − 2s), h s r², −h s² r]` (Hermite), and outside linear in `x`.
+/// The weights of `[f₀, f₁, f₀′, f₁′]` in a derivative of a cubic piece: of order zero, with
+/// `s = (x − x₀)/h` and `r = 1 − s`, they are `[r² (1 + 2s), s² (3 − 2s), h s r², −h s² r]`
+/// (Hermite); outside they are linear in `x`.
 #[inline(always)]
 pub fn hermite_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
     let c = S::from_f64;
@@ -41,26 +41,26 @@ pub fn hermite_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] 
     }
 }
 
-/// What holds at the first and the last point of a spline.
+/// The end conditions of a spline.
 #[derive(Clone, Copy)]
 pub enum EndConditions {
     /// The second derivative is zero.
     Natural,
-    /// These are the slopes.
+    /// Given slopes.
     Slopes([f64; 2]),
-    /// The third derivative is continuous at the second and the last but one point.
+    /// The third derivative is continuous at the second and the second-to-last point.
     NotAKnot,
 }
 
-/// The slopes at its points of the cubic spline whose second derivative is continuous (C. de Boor,
-/// "A Practical Guide to Splines", chapter IV).
+/// The slopes at the points of the cubic spline with continuous second derivative (C. de Boor, "A
+/// Practical Guide to Splines", chapter IV).
 ///
 /// ```text
 /// f′ᵢ₋₁/hᵢ₋₁ + 2 (1/hᵢ₋₁ + 1/hᵢ) f′ᵢ + f′ᵢ₊₁/hᵢ = 3 (δᵢ₋₁/hᵢ₋₁ + δᵢ/hᵢ),   δᵢ = (fᵢ₊₁ − fᵢ)/hᵢ
 /// ```
 ///
-/// The matrix is tridiagonal, and no pivots have to be looked for: it is diagonally dominant, but
-/// for the rows of ends that are no knots, whose pivots are positive too.
+/// The tridiagonal matrix needs no pivoting: it is diagonally dominant, except in the rows of
+/// not-a-knot ends, whose pivots are positive.
 pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
     let slopes = solve_slopes(points, values, ends);
     check_slopes(&slopes);
@@ -99,7 +99,7 @@ const fn solve_slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends
 }
 
 /// The row of a point: below, on and above the diagonal, and the right-hand side. The second
-/// derivatives of both sides are equal, or zero where there is one side only.
+/// derivatives of both sides are equal; at an end the one side is zero.
 const fn smoothness_row<const N: usize>(points: &[f64; N], values: &[f64; N], i: usize) -> [f64; 4] {
     let [mut lower, mut diagonal, mut above, mut right] = [0.0; 4];
     if i > 0 {
@@ -117,7 +117,7 @@ const fn smoothness_row<const N: usize>(points: &[f64; N], values: &[f64; N], i:
     [lower, diagonal, above, right]
 }
 
-/// The row of an end, from which two more points go inwards: both pieces are one polynomial.
+/// The row of a not-a-knot end and its two inner neighbours: both pieces are one polynomial.
 ///
 /// ```text
 /// k f′₀ + (h + k) f′₁ = ((3h + 2k) k δ₀ + h² δ₁)/(h + k)

@@ -4,7 +4,7 @@ use super::points::{adjacent_pair, check_increasing, check_linear_slopes, check_
 use super::{KINKS, Table, cell_number};
 use crate::scalar::{Real, Rows, Scalar};
 
-/// A function that is linear between points, and beyond them.
+/// A piecewise linear function, extrapolated linearly.
 ///
 /// ```
 /// use casados::tables::Linear;
@@ -24,8 +24,8 @@ impl<const N: usize> Linear<N> {
     /// A table of values at increasing points.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
-    /// error of the compiler.
+    /// If points do not increase, or a number or slope is not finite; in a `const` this is a
+    /// compile-time error.
     #[must_use]
     pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
         check_increasing(&points);
@@ -40,7 +40,7 @@ impl<const N: usize> Linear<N> {
         self.partial([x], [0])
     }
 
-    /// `f′(x)`; at a point, of the piece on the right.
+    /// `f′(x)`; at a point, of the piece to its right.
     #[inline]
     pub fn derivative<S: Scalar>(&self, x: S) -> S {
         self.partial([x], [1])
@@ -68,7 +68,8 @@ impl<const N: usize> Table<1> for Linear<N> {
     }
 }
 
-/// A function of two variables that is linear in each of them in every cell of a grid, and beyond.
+/// A function of two variables that is bilinear in every cell of a grid, extrapolated in the same
+/// way.
 ///
 /// `values[i][j]` belongs to `x[i]` and `y[j]`.
 ///
@@ -90,8 +91,8 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
     /// A table of values on a grid of increasing points.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
-    /// error of the compiler.
+    /// If points do not increase, or a number or slope is not finite; in a `const` this is a
+    /// compile-time error.
     #[must_use]
     pub const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check_increasing(&x);
@@ -152,7 +153,7 @@ impl<const N: usize, const M: usize> Table<2> for Linear2<N, M> {
     }
 }
 
-/// The weights with which a derivative of a linear piece is made of the values at its ends.
+/// The weights of the values at the ends of a linear piece in its value or derivative.
 #[inline(always)]
 fn linear_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 2] {
     let (one, h) = (S::from_f64(1.0), x1 - x0);

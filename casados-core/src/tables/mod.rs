@@ -1,7 +1,7 @@
-//! Look-up tables and splines: functions of one or two variables that interpolate numbers.
+//! Look-up tables and splines: functions of one or two variables that interpolate values.
 //!
-//! They are constants of a model, and methods that `#[dae]`, `#[ode]` and `#[function]` know: first
-//! and second derivatives are exact, and the function stays one that can be called.
+//! They are constants of a model, and `#[dae]`, `#[ode]` and `#[function]` support their methods:
+//! first and second derivatives are exact, and the model remains an ordinary function.
 //!
 //! ```
 //! use casados::prelude::*;
@@ -29,20 +29,19 @@
 //! | type | function | derivatives |
 //! | --- | --- | --- |
 //! | [`Linear`] | `(1 − s) fᵢ + s fᵢ₊₁` with `s = (x − xᵢ)/(xᵢ₊₁ − xᵢ)` | the first one jumps at the points |
-//! | [`Linear2`] | the same in both variables: bilinear in each cell | likewise |
-//! | [`Spline`] | the cubic spline: natural (of all functions through the points that with the least `∫ f″² dx`), with given slopes at its ends, or not-a-knot | C²; the third one jumps |
+//! | [`Linear2`] | bilinear in each cell | the first ones jump at the lines of the grid |
+//! | [`Spline`] | the cubic spline: natural (minimal `∫ f″² dx` of all functions through the points), clamped (given slopes at its ends), or not-a-knot | C²; the third one jumps |
 //! | [`Spline2`] | the tensor product of cubic splines, natural or not-a-knot | C² |
 //!
-//! **Outside of the points** all of them are continued linearly, in each variable: finite, and as
-//! smooth as inside, but for splines that are not natural: a natural one has `f″ = 0` at its ends,
-//! so that it stays C², where the second derivative of the others jumps. A linear table that should
-//! stay constant has its last value twice; a spline is clamped with the slope zero.
+//! **Extrapolation** is linear in each variable. Natural splines remain C², since `f″ = 0` at their
+//! ends; the second derivative of other splines jumps there. For constant extrapolation repeat the
+//! last value of a linear table, or clamp a spline with slope zero.
 //!
-//! **Where a linear table has a kink** its derivative is that of the piece on the right. Steps
-//! across one lose their order: adaptive implicit methods see them and take shorter ones. A spline
-//! has none.
+//! **Kinks.** At a point of a linear table the derivative is that of the piece to its right. Steps
+//! across a kink lose their order: adaptive implicit methods detect kinks and reduce the step size.
+//! Splines have no kinks.
 //!
-//! Points that do not increase and numbers that are not finite are errors of the compiler in a
+//! Points that do not increase and numbers that are not finite are compile-time errors in a
 //! `const`.
 
 mod cubic;
@@ -57,7 +56,7 @@ pub use spline::{Spline, Spline2};
 
 use crate::scalar::Scalar;
 
-/// A function of `K` variables with all of its derivatives: what emitted code calls.
+/// A function of `K` variables with all of its derivatives: the interface for emitted code.
 #[doc(hidden)]
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no table of `casados::tables` with so many variables: {K}",
@@ -65,17 +64,17 @@ use crate::scalar::Scalar;
 )]
 pub trait Table<const K: usize> {
     /// The derivative of these orders in each variable: of zeros the value; of [`KINKS`] or
-    /// [`KNOTS`] what tells its pieces apart.
+    /// [`KNOTS`] a number that identifies the piece.
     fn partial<S: Scalar>(&self, at: [S; K], orders: [u32; K]) -> S;
 }
 
-/// An order that stands for a number of each piece, where the first derivative jumps between them;
-/// else zero.
+/// An order for which `partial` returns a number that identifies the piece, if the first derivative
+/// jumps between pieces; otherwise zero.
 pub(crate) const KINKS: u32 = 254;
-/// The same where a higher derivative jumps.
+/// As [`KINKS`], if a higher derivative jumps.
 pub(crate) const KNOTS: u32 = 255;
 
-/// A number of a cell, by its lower left corner.
+/// A number that identifies a cell, by its lower left corner.
 #[inline(always)]
 fn cell_number<S: Scalar>(x0: S, y0: S) -> S {
     x0 + S::from_f64(core::f64::consts::SQRT_2) * y0

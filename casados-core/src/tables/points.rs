@@ -2,7 +2,7 @@
 
 use crate::scalar::Real;
 
-/// Stops the compiler where points do not increase.
+/// Panics if points do not increase.
 pub const fn check_increasing<const N: usize>(points: &[f64; N]) {
     assert!(N >= 2, "a table has at least two points");
     let mut i = 0;
@@ -13,7 +13,7 @@ pub const fn check_increasing<const N: usize>(points: &[f64; N]) {
     }
 }
 
-/// Stops the compiler where values are not finite.
+/// Panics if values are not finite.
 pub const fn check_values<const N: usize>(values: &[f64; N]) {
     let mut i = 0;
     while i < N {
@@ -22,7 +22,7 @@ pub const fn check_values<const N: usize>(values: &[f64; N]) {
     }
 }
 
-/// Stops the compiler where slopes of straight lines between points are not finite.
+/// Panics if slopes of linear pieces are not finite.
 pub const fn check_linear_slopes<const N: usize>(points: &[f64; N], values: &[f64; N]) {
     let mut slopes = [0.0; N];
     let mut i = 1;
@@ -33,7 +33,7 @@ pub const fn check_linear_slopes<const N: usize>(points: &[f64; N], values: &[f6
     check_slopes(&slopes);
 }
 
-/// Stops the compiler where slopes are not finite.
+/// Panics if slopes are not finite.
 pub const fn check_slopes<const N: usize>(slopes: &[f64; N]) {
     let mut i = 0;
     while i < N {
@@ -45,7 +45,7 @@ pub const fn check_slopes<const N: usize>(slopes: &[f64; N]) {
     }
 }
 
-/// The interval from this point to the next one is that of `x`; outside of all, the nearest.
+/// The index of the interval that contains `x`; outside of the table, of the nearest one.
 #[inline(always)]
 pub fn interval_index<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {
     let (mut first, mut count) = (0, N.saturating_sub(1));
@@ -58,12 +58,12 @@ pub fn interval_index<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize
     first
 }
 
-/// Two numbers that follow each other in a table.
+/// Two successive elements of a table.
 #[inline(always)]
 pub fn adjacent_pair<T>(table: &[T], first: usize) -> [&T; 2] {
     match table.get(first..) {
         Some([a, b, ..]) => [a, b],
-        // Tables have two points at least, and intervals lie between them.
+        // Unreachable: tables have at least two points, and the index is that of an interval.
         _ => [&table[0]; 2],
     }
 }

@@ -5,7 +5,8 @@ use super::points::{adjacent_pair, check_increasing, check_values, interval_inde
 use super::{KNOTS, Table, cell_number};
 use crate::scalar::{Real, Rows, Scalar};
 
-/// A cubic spline: twice continuously differentiable, through all points, linear beyond them.
+/// A cubic spline: twice continuously differentiable, interpolates all points, extrapolated
+/// linearly.
 ///
 /// In each interval, with `s = (x − xᵢ)/h` and `r = 1 − s`,
 ///
@@ -13,12 +14,12 @@ use crate::scalar::{Real, Rows, Scalar};
 /// f = r² (1 + 2s) fᵢ + s² (3 − 2s) fᵢ₊₁ + h s r² f′ᵢ − h s² r f′ᵢ₊₁
 /// ```
 ///
-/// with the slopes `f′ᵢ` of which `f″` is continuous. Two more conditions hold at the ends:
+/// with the slopes `f′ᵢ` that make `f″` continuous. The end conditions are:
 ///
-/// | | at the ends | beyond them |
+/// | constructor | at the ends | beyond |
 /// | --- | --- | --- |
 /// | [`Spline::natural`] | `f″ = 0` | C² |
-/// | [`Spline::clamped`] | `f′` is given | C¹: `f″` falls to zero |
+/// | [`Spline::clamped`] | `f′` is given | C¹: `f″` jumps to zero |
 /// | [`Spline::not_a_knot`] | `f‴` is continuous at the points next to them | C¹ |
 ///
 /// ```
@@ -36,7 +37,7 @@ use crate::scalar::{Real, Rows, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spline<const N: usize> {
     points: [f64; N],
-    /// Value and slope.
+    /// The value and slope at each point.
     nodes: [[f64; 2]; N],
 }
 
@@ -44,8 +45,8 @@ impl<const N: usize> Spline<N> {
     /// The natural spline through values at increasing points: `f″ = 0` at both ends.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
-    /// error of the compiler.
+    /// If points do not increase, or a number or slope is not finite; in a `const` this is a
+    /// compile-time error.
     #[must_use]
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
         check_increasing(&points);
@@ -53,8 +54,8 @@ impl<const N: usize> Spline<N> {
         Self::new(points, values, EndConditions::Natural)
     }
 
-    /// The spline through values at increasing points whose first and last slope are given: of all
-    /// functions with these values and slopes that with the least `∫ f″² dx`.
+    /// The clamped spline through values at increasing points, with given first and last slope:
+    /// minimal `∫ f″² dx` of all functions with these values and slopes.
     ///
     /// # Panics
     /// As [`Spline::natural`].
@@ -66,10 +67,10 @@ impl<const N: usize> Spline<N> {
         Self::new(points, values, EndConditions::Slopes(slopes))
     }
 
-    /// The spline through values at increasing points of which the first two pieces are one
-    /// polynomial, and the last two: it is the one of a cubic polynomial, and its error is of
-    /// fourth order up to the ends, where that of a natural spline is of second order. Of three
-    /// points it is the parabola, of two the line.
+    /// The not-a-knot spline through values at increasing points: the first two pieces are one
+    /// polynomial, and so are the last two. It reproduces cubic polynomials, and its error has
+    /// order four up to the ends, where that of a natural spline has order two. For three points it
+    /// is the parabola, for two the line.
     ///
     /// # Panics
     /// As [`Spline::natural`].
@@ -80,7 +81,7 @@ impl<const N: usize> Spline<N> {
         Self::new(points, values, EndConditions::NotAKnot)
     }
 
-    /// Points are checked by the callers: so the compiler names them.
+    /// Callers check the points, so that compiler errors name the caller.
     const fn new(points: [f64; N], values: [f64; N], ends: EndConditions) -> Self {
         let slopes = slopes(&points, &values, ends);
         let mut nodes = [[0.0; 2]; N];
@@ -127,8 +128,9 @@ impl<const N: usize> Table<1> for Spline<N> {
     }
 }
 
-/// A function of two variables that is a cubic spline in each of them: the tensor product, twice
-/// continuously differentiable, through all points of a grid, linear in each variable beyond.
+/// A function of two variables that is a cubic spline in each: the tensor product, twice
+/// continuously differentiable, interpolates all points of a grid, extrapolated linearly in each
+/// variable.
 ///
 /// `values[i][j]` belongs to `x[i]` and `y[j]`.
 ///
@@ -156,8 +158,8 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// each variable.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
-    /// error of the compiler.
+    /// If points do not increase, or a number or slope is not finite; in a `const` this is a
+    /// compile-time error.
     #[must_use]
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check_increasing(&x);
@@ -247,7 +249,7 @@ impl<const N: usize, const M: usize> Table<2> for Spline2<N, M> {
         }
         let [a0, a1, b0, b1] = hermite_weights(x, [x0, x1], orders[0]);
         let [c0, c1, d0, d1] = hermite_weights(y, [y0, y1], orders[1]);
-        // Of the node `k` of the cell, by its value and its slope in x.
+        // The node `k` of the cell, by its value and its slope in x.
         let node = |k: usize, a: S, b: S| {
             let at = |n: usize| row[4 + 4 * k + n];
             [a * at(0) + b * at(1), a * at(2) + b * at(3)]

@@ -1,4 +1,5 @@
-//! Tables against closed forms, another way to the same splines, and three ways to derivatives.
+//! Tables against closed forms, splines against a second algorithm, and derivatives by three
+//! methods.
 
 use super::*;
 use crate::scalar::lanes::{F32x4, F64x2};
@@ -30,7 +31,7 @@ fn assert_close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * (1.0 + expected.abs()), "{found} is not {expected}");
 }
 
-/// Inside and outside of the points, none of them a point.
+/// Points inside and outside of the table, none of them a node.
 fn sample_points() -> impl Iterator<Item = f64> {
     (0..60).map(|k| -3.017 + 0.1501 * f64::from(k))
 }
@@ -48,8 +49,8 @@ fn values_at_the_points() {
     }
 }
 
-/// The natural spline through 0, 1, 0 at 0, 1, 2 is `(3x − x³)/2` up to the middle, and outside a
-/// line.
+/// The natural spline through 0, 1, 0 at 0, 1, 2 is `(3x − x³)/2` up to the middle, and linear
+/// outside.
 #[test]
 fn spline_through_three_points() {
     const HAT: Spline<3> = Spline::natural([0.0, 1.0, 2.0], [0.0, 1.0, 0.0]);
@@ -82,8 +83,7 @@ fn spline_through_three_points() {
     assert_eq!(HAT.partial([0.3], [4]), 0.0);
 }
 
-/// A cubic polynomial with its derivatives: the spline that knows the slopes at its ends, and the
-/// one without knots next to them, are the polynomial itself.
+/// Clamped and not-a-knot splines reproduce a cubic polynomial and its derivatives.
 #[test]
 fn cubic_polynomials_are_reproduced() {
     let cubic =
@@ -123,8 +123,8 @@ fn fewer_points_than_four_are_a_polynomial() {
     }
 }
 
-/// Clamped and not-a-knot splines are of fourth order up to the ends; natural ones of second order
-/// where the function bends there.
+/// Clamped and not-a-knot splines have order four up to the ends; natural ones have order two where
+/// the function has curvature there.
 #[test]
 fn errors_at_the_ends_have_their_orders() {
     fn errors<const N: usize>() -> [f64; 3] {
@@ -151,7 +151,7 @@ fn errors_at_the_ends_have_their_orders() {
     }
 }
 
-/// What holds at the ends of the splines of the tests.
+/// The end conditions of the tested splines.
 #[derive(Clone, Copy)]
 enum TestEnds {
     Natural,
@@ -159,7 +159,7 @@ enum TestEnds {
     NotAKnot,
 }
 
-/// The same spline by its second derivatives at the points, from a dense system.
+/// The same spline by its second derivatives at the points (moments), from a dense system.
 fn spline_by_moments(ends: TestEnds, points: &[f64], values: &[f64], x: f64) -> f64 {
     let n = points.len();
     let h = |i: usize| points[i + 1] - points[i];
@@ -270,8 +270,8 @@ fn all_tables_are_continued_linearly() {
     assert!(NATURAL.value(1e300_f64).is_finite());
 }
 
-/// Derivatives of lower order, differentiated by hyper-dual numbers, by complex numbers, and by
-/// differences of sixth order.
+/// Compares derivatives with those of lower order, differentiated by hyper-dual numbers, by complex
+/// numbers, and by differences of sixth order.
 fn check_derivatives<const K: usize>(table: &impl Table<K>, orders: [u32; K], at: [f64; K]) {
     let value = |at: [f64; K]| table.partial(at, orders);
     for j in 0..K {

@@ -1,9 +1,9 @@
-//! Running error analysis: a number and a bound of its rounding error.
+//! Running error analysis: a number with a bound of its rounding error.
 //!
-//! Every operation adds what it rounds and carries on what its arguments have lost, to first order
-//! (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). Run through
-//! emitted code it yields condition times epsilon of every entry, which is what tolerances of
-//! comparisons are made of.
+//! Every operation adds its own rounding error and propagates those of its arguments, to first
+//! order (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). For
+//! emitted code the bound is the condition number times epsilon for every entry, which gives the
+//! tolerances of comparisons.
 
 use crate::scalar::{Field, Lanes, Rows, Scalar, Sealed, mask_logic, one_mask, own_cell};
 use bytemuck::Zeroable;
@@ -12,10 +12,10 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Unit roundoff.
 const UNIT_ROUNDOFF: f64 = 0.5 * f64::EPSILON;
-/// Elementary functions of the standard library are off by less than one unit in the last place.
+/// Error of elementary functions of the standard library: less than one unit in the last place.
 const FUNCTION_ERROR: f64 = 2.0 * UNIT_ROUNDOFF;
 
-/// A number and a bound of its rounding error.
+/// A number with a bound of its rounding error.
 ///
 /// ```
 /// use casados::testing::Bounded;
@@ -34,25 +34,25 @@ pub struct Bounded {
 }
 
 impl Bounded {
-    /// A number that is exact.
+    /// An exact number.
     #[must_use]
     pub const fn exact(value: f64) -> Self {
         Self { value, error: 0.0 }
     }
 
-    /// A function of one argument, its value and the size of its derivative.
+    /// A function of one argument: its value and the magnitude of its derivative.
     fn function(self, value: f64, derivative: f64) -> Self {
         Self { value, error: propagated_error(derivative, self.error) + FUNCTION_ERROR * value.abs() }
     }
 }
 
-/// What an argument's error becomes; an exact argument stays exact where the derivative is
-/// infinite.
+/// The propagated error of an argument; an exact argument stays exact even for an infinite
+/// derivative.
 fn propagated_error(derivative: f64, error: f64) -> f64 {
     if error == 0.0 { 0.0 } else { derivative.abs() * error }
 }
 
-/// The bound of a rounding: zero where nothing was lost, so that exact numbers stay exact.
+/// The bound of a rounding error: zero if `lost` is zero, so that exact numbers stay exact.
 fn rounding_error(value: f64, lost: f64) -> f64 {
     if lost == 0.0 { 0.0 } else { UNIT_ROUNDOFF * value.abs() }
 }
@@ -61,7 +61,7 @@ impl Add for Bounded {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         let value = self.value + other.value;
-        // What the sum has rounded (Knuth's TwoSum).
+        // The rounding error of the sum (Knuth's TwoSum).
         let other_part = value - self.value;
         let lost = (self.value - (value - other_part)) + (other.value - other_part);
         Self { value, error: self.error + other.error + rounding_error(value, lost) }
@@ -175,7 +175,7 @@ impl Scalar for Bounded {
         let value = self.value.hypot(other.value);
         Self { value, error: self.error + other.error + FUNCTION_ERROR * value }
     }
-    // Square and multiply: as many roundings as the exponent, at most.
+    // Square and multiply: at most as many roundings as the exponent.
     fn powi(self, n: i32) -> Self {
         let value = self.value.powi(n);
         let derivative = f64::from(n) * self.value.powi(n - 1);
@@ -220,7 +220,7 @@ impl Lanes for Bounded {
     fn lane(cell: &Self, _: usize) -> f64 {
         cell.value
     }
-    // A number that comes from code which does not carry the bound along is at least rounded.
+    // A number from code that does not propagate the bound has at least a rounding error.
     fn set_lane(cell: &mut Self, _: usize, value: f64) {
         *cell = Self { value, error: f64::EPSILON * value.abs() };
     }

@@ -1,10 +1,10 @@
-//! The error of an integrator over step sizes, and the order of convergence.
+//! The order of convergence of an integrator: errors over step sizes.
 
 use core::fmt;
 use std::string::String;
 use std::vec::Vec;
 
-/// Errors over numbers of steps. It prints as a table.
+/// Errors over numbers of steps. Displayed as a table.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -28,18 +28,18 @@ use std::vec::Vec;
 #[derive(Clone, Debug)]
 #[must_use = "a report says whether the check has passed: call `assert_order` or look at `order`"]
 pub struct Convergence {
-    /// Number of steps and largest error, in the order given.
+    /// The number of steps and the largest error, in the given order.
     pub rows: Vec<(usize, f64)>,
-    /// The error that rounding alone may cause; errors below say nothing about the order.
+    /// The error due to rounding; smaller errors do not contribute to the order.
     pub floor: f64,
-    /// What went wrong, if the integrator failed: number of steps and message.
+    /// The failure of the integrator, if any: number of steps and message.
     pub failure: Option<(usize, String)>,
 }
 
 /// Runs an integrator with each number of steps and compares with the exact solution; errors are
 /// `max |x − exact|` over the states.
 ///
-/// `floor` is the error that rounding may cause: condition of the problem times epsilon, as a rule.
+/// `floor` is the rounding error: usually the condition number of the problem times epsilon.
 ///
 /// ```
 /// use casados_core::testing::convergence;
@@ -62,7 +62,7 @@ pub fn convergence<E: fmt::Display>(
     for &n in steps {
         match integrate(n) {
             Ok(x) if x.len() == exact.len() => {
-                // Written so that a NaN is an infinite error.
+                // NaN counts as an infinite error.
                 let error = x.iter().zip(exact).fold(0.0, |worst, (x, exact)| {
                     let error = (x - exact).abs();
                     if error <= worst {
@@ -95,13 +95,13 @@ impl Convergence {
         (a.1 / b.1).ln() / (b.0 as f64 / a.0 as f64).ln()
     }
 
-    /// The rows whose errors are truncation rather than rounding: ten times above the floor.
+    /// The rows with truncation errors, at least ten times above the floor.
     fn rows_above_floor(&self) -> Vec<(usize, f64)> {
         self.rows.iter().copied().filter(|row| row.1 > 10.0 * self.floor && row.1.is_finite()).collect()
     }
 
-    /// The slope of `log error` over `log(1/steps)` fitted to the errors above the floor; of the
-    /// last three of them, where the asymptote is closest. `None` with fewer than two.
+    /// The slope of `log error` over `log(1/steps)`, fitted to the last three errors above the
+    /// floor, which are closest to the asymptote. `None` with fewer than two.
     #[must_use]
     pub fn order(&self) -> Option<f64> {
         let rows = self.rows_above_floor();
@@ -125,8 +125,8 @@ impl Convergence {
     }
 
     /// Panics with the table unless every run succeeded and the fitted order is within a quarter of
-    /// `order`: half way to the nearest half order, so that neither a method of another order nor
-    /// one with order reduction passes.
+    /// `order`: half of the distance to the nearest half order, so that methods of another order
+    /// and methods with order reduction fail.
     #[track_caller]
     pub fn assert_order(&self, order: f64) {
         let found = self.order();

@@ -1,4 +1,4 @@
-//! The facts of a structure that let the engine leave work out, against patterns and values.
+//! Checks of the declared structure, which lets the engine skip work, against patterns and values.
 
 use super::evaluate;
 use super::report::{Entry, Report};
@@ -7,7 +7,7 @@ use crate::shape::{Array, Shape};
 use std::format;
 use std::vec::Vec;
 
-/// Compares what is declared with the declared patterns, and with the Jacobian at two points.
+/// Compares the declared structure with the declared patterns, and with the Jacobian at two points.
 pub(super) fn check_declared_structure<M: Dae>(
     report: &mut Report,
     number: usize,
@@ -58,7 +58,7 @@ pub(super) fn check_declared_structure<M: Dae>(
     check_declared_patterns::<M>(report, number);
 }
 
-/// Compares what is declared with the declared patterns.
+/// Compares the declared structure with the declared patterns.
 fn check_declared_patterns<M: Dae>(report: &mut Report, number: usize) {
     let structure = &M::STRUCTURE;
     let (nx, nz, time) = (M::Shape::NX, M::Shape::NZ, M::Shape::NV - 1);
@@ -71,7 +71,7 @@ fn check_declared_patterns<M: Dae>(report: &mut Report, number: usize) {
     report.compare("entries by column", "pattern", number, 0.0, found, |i| format!("number {i}"));
 
     let diagonal = |entry: u32| structure.hessian.rows.get(entry as usize).copied();
-    // What is left out must not matter: no entry in the columns of the others.
+    // Skipped columns must be empty: those of the variables that are not listed.
     let mut absent = |what: &'static str, count: usize, listed: &[u32], entries: &dyn Fn(usize) -> usize| {
         let others = (0..count).filter(|&i| !listed.contains(&(i as u32)));
         let found = others.map(|i| (i, Entry { value: entries(i) as f64, expected: 0.0, tolerance: 0.0 }));
@@ -96,7 +96,7 @@ fn check_declared_patterns<M: Dae>(report: &mut Report, number: usize) {
     absent("quadratures", nx, &influential, &|state| column(nx + state));
     let ordinary: Vec<u32> =
         (0..M::Shape::NK as u32).filter(|row| !structure.trivial.contains(row)).collect();
-    // One derivative, one other variable at most, constant coefficients.
+    // One derivative, at most one other variable, constant coefficients.
     absent("trivial equations", M::Shape::NK, &ordinary, &|row| {
         let own = |e: &usize| structure.jacobian.at(*e).0 == row;
         let derivatives = (0..structure.blocks[1]).filter(own).count();

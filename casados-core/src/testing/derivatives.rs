@@ -1,4 +1,4 @@
-//! The derivatives of a model against independent ones.
+//! Checks of a model's derivatives against independent ones.
 
 use super::declared_structure;
 use super::evaluate::{self, BoundedMatrix, derivative_variable_count};
@@ -12,12 +12,12 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-/// Checks the residual, Jacobian, adjoint and Hessian of a graph model three ways:
-/// against `num-dual`, the complex step, and central differences of order 8.
+/// Checks the residual, Jacobian, adjoint and Hessian of a graph model three ways: against
+/// `num-dual`, the complex step, and central differences of order 8.
 ///
-/// Compared are all entries, those outside of the declared patterns too: they must be zero.
-/// Tolerances are bounds of the rounding errors of both sides at that very point (running error
-/// analysis), to which differences add their own estimate of truncation.
+/// All entries are compared; those outside of the declared patterns must be zero. Tolerances are
+/// bounds of the rounding errors of both sides at each point (running error analysis), plus the
+/// truncation error for differences.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -86,9 +86,9 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
     report
 }
 
-/// Checks by differences that entries outside of the declared patterns are zero, those of the
-/// Jacobian and those of the Hessian; and that what is declared constant does not change from point
-/// to point, and what is declared to matter to nobody has no entries.
+/// Checks by differences that entries of the Jacobian and the Hessian outside of the declared
+/// patterns are zero, that entries declared constant are the same at all points, and that variables
+/// declared unused have no entries.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -137,7 +137,7 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     report
 }
 
-/// The points with their numbers, and seeds `μ` in `[-1, 1]` for each.
+/// The points with their indices, and seeds `μ` in `[-1, 1]` for each.
 fn sample_points<M: Dae>(points: &Points<M>) -> impl Iterator<Item = (usize, ArrayV<M, f64>, Vec<f64>)> {
     points.iter().enumerate().map(|(number, v)| {
         let mut random = Random::new(number as u64 + 1);
@@ -145,7 +145,7 @@ fn sample_points<M: Dae>(points: &Points<M>) -> impl Iterator<Item = (usize, Arr
     })
 }
 
-/// The residual that comes with the Jacobian is the residual, bit by bit.
+/// The residual evaluated with the Jacobian is bitwise equal to the residual.
 fn check_residual<M: Dae>(report: &mut Report, number: usize, v: &ArrayV<M, f64>) {
     let alone = evaluate::residual::<M, f64>(v);
     let (beside, _) = evaluate::jacobian::<M, f64>(v);
@@ -158,7 +158,7 @@ fn check_residual<M: Dae>(report: &mut Report, number: usize, v: &ArrayV<M, f64>
     report.compare("residual with Jacobian", "residual", number, 0.0, entries.enumerate(), name);
 }
 
-/// Equations that are declared linear have no second derivatives.
+/// Equations declared linear have no second derivatives.
 fn check_linear<M: Dae>(report: &mut Report, number: usize, v: &ArrayV<M, f64>) {
     for (row, _) in M::STRUCTURE.linear.iter().enumerate().filter(|(_, linear)| **linear) {
         let mu: Vec<f64> = (0..M::Shape::NK).map(|r| f64::from(u8::from(r == row))).collect();
@@ -169,7 +169,7 @@ fn check_linear<M: Dae>(report: &mut Report, number: usize, v: &ArrayV<M, f64>) 
     }
 }
 
-/// `Jᵀ μ` with bounds, and a zero for `t`.
+/// `Jᵀ μ` with error bounds, and a zero for `t`.
 fn transposed_product(jacobian: &BoundedMatrix, mu: &[f64]) -> BoundedMatrix {
     let (rows, columns) = jacobian.value.shape();
     let (mut value, mut error) = (DMatrix::zeros(columns + 1, 1), DMatrix::zeros(columns + 1, 1));
@@ -177,7 +177,7 @@ fn transposed_product(jacobian: &BoundedMatrix, mu: &[f64]) -> BoundedMatrix {
         for (r, &mu) in mu.iter().enumerate().take(rows) {
             let product = mu * jacobian.value[(r, j)];
             value[j] += product;
-            // One rounding for the product and one for each sum that it takes part in.
+            // One rounding for the product, and one for each sum.
             error[j] += mu.abs() * jacobian.error[(r, j)] + rows as f64 * f64::EPSILON * product.abs();
         }
     }

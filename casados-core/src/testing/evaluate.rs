@@ -1,4 +1,4 @@
-//! A model's own derivatives as dense matrices, and the same from independent sources.
+//! A model's own derivatives as dense matrices, and those of independent methods.
 
 use super::bounded::Bounded;
 use super::forward::Forward;
@@ -10,14 +10,14 @@ use num_complex::Complex64;
 use num_dual::{Dual64, HyperDual64};
 use std::vec::Vec;
 
-/// The complex step, about `1e-200`; a power of two, so that multiplying by it rounds nothing.
+/// The complex step, about `1e-200`; a power of two, so that multiplications by it are exact.
 const COMPLEX_STEP: f64 = f64::from_bits((1023 - 664) << 52);
 
-/// How many operations of a reference stand against one of [`Forward`]: a complex
+/// Ratio of the rounding errors of an operation of a reference and of [`Forward`]: a complex
 /// division rounds three times in each part.
 const REFERENCE_ERROR_FACTOR: f64 = 4.0;
 
-/// Values, and bounds of their errors.
+/// Values with bounds of their errors.
 #[derive(Clone, Debug)]
 pub(super) struct BoundedMatrix {
     pub value: DMatrix<f64>,
@@ -30,12 +30,12 @@ impl BoundedMatrix {
     }
 }
 
-/// Variables that derivatives are taken by: all but `t`.
+/// The number of variables for derivatives: all but `t`.
 pub(super) const fn derivative_variable_count<M: Dae>() -> usize {
     M::Shape::NV - 1
 }
 
-/// A point in another arithmetic.
+/// Converts a point to another number type.
 fn convert_point<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
     Array::from_fn(|i| S::from_f64(v[i]))
 }
@@ -51,7 +51,7 @@ pub(super) fn residual<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>) -> ArrayK<M
     f
 }
 
-/// `f(v)` beside its Jacobian, and the Jacobian. Entries that nothing has written are NaN.
+/// `f(v)` as evaluated with the Jacobian, and the Jacobian. Entries that are not written are NaN.
 pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, DMatrix<S>) {
     let mut f = filled_array::<S, ArrayK<M, S>>(f64::NAN);
     let mut values = filled_array::<S, M::Jacobian<S>>(f64::NAN);
@@ -64,7 +64,7 @@ pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (Array
     (f, dense)
 }
 
-/// `∇(μᵀ f)`, with `t`.
+/// `∇(μᵀ f)`, including `t`.
 pub(super) fn adjoint<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>, mu: &[f64]) -> ArrayV<M, S> {
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
     let mut gradient = filled_array::<S, ArrayV<M, S>>(f64::NAN);
@@ -90,13 +90,13 @@ pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]
     dense
 }
 
-/// The model's own values with bounds of their rounding.
+/// The model's own Jacobian with error bounds.
 pub(super) fn model_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
     let bounds = jacobian::<M, Bounded>(v).1;
     BoundedMatrix { value: jacobian::<M, f64>(v).1, error: bounds.map(|b| b.error) }
 }
 
-/// The model's own gradient as one column, with bounds.
+/// The model's own gradient as one column, with error bounds.
 pub(super) fn model_gradient<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let bounds = adjoint::<M, Bounded>(&convert_point::<M, Bounded>(v), mu);
     let values = adjoint::<M, f64>(v, mu);
@@ -106,13 +106,14 @@ pub(super) fn model_gradient<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedM
     }
 }
 
-/// The model's own Hessian with bounds.
+/// The model's own Hessian with error bounds.
 pub(super) fn model_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let bounds = hessian::<M, Bounded>(v, mu);
     BoundedMatrix { value: hessian::<M, f64>(v, mu), error: bounds.map(|b| b.error) }
 }
 
-/// A function of a point in another arithmetic, at `v` in the direction of variable `j`.
+/// Evaluates a function of a point in another number type, at `v`, seeded in the direction of
+/// variable `j`.
 fn evaluate_seeded<S: Scalar<Cell = S>>(
     v: &[f64],
     outputs: usize,
@@ -174,7 +175,7 @@ pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Bound
         for j in 0..=i {
             let seed = |k, value| HyperDual64::new(value, is(k, i), is(k, j), 0.0);
             let f = evaluate_seeded(v.as_ref(), M::Shape::NK, seed, M::residual_of::<HyperDual64>);
-            // Rows without second derivative add exact zeros.
+            // Rows without second derivatives add exact zeros.
             let mut sum = Bounded::exact(0.0);
             if f.iter().any(|f| f.eps1eps2 != 0.0) {
                 let seed = |k, value| Forward {
@@ -233,7 +234,7 @@ pub(super) fn difference_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Boun
     })
 }
 
-/// Derivatives of a function of the point by each variable.
+/// Derivatives of a function of the point with respect to each variable.
 fn difference_matrix<M: Dae>(
     v: &ArrayV<M, f64>,
     outputs: usize,

@@ -1,4 +1,4 @@
-//! An integrator against an exact solution.
+//! Checks of an integrator against an exact solution.
 
 use super::integrator::CheckedInterval;
 use super::names::{direction_name, second_derivative_name, state_name};
@@ -16,8 +16,7 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-/// An exact solution: the end state and, as far as they are known, its derivatives by
-/// `w = (x₀, u, p)`.
+/// An exact solution: the end state and its known derivatives with respect to `w = (x₀, u, p)`.
 ///
 /// ```
 /// # use casados::testing::Exact;
@@ -32,7 +31,7 @@ use std::vec::Vec;
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Exact {
-    /// `x` at the end of the interval, and after it `z` if that is known.
+    /// `x` at the end of the interval, followed by `z` if known.
     pub states: Vec<f64>,
     /// `∂(x, z)/∂w`, a row per state; empty if not known.
     pub first: Vec<Vec<f64>>,
@@ -40,11 +39,11 @@ pub struct Exact {
     pub second: Vec<Vec<Vec<f64>>>,
 }
 
-/// Checks an integrator against an exact solution, first and second derivatives included.
+/// Checks an integrator against an exact solution, with first and second derivatives.
 ///
-/// `coarse` takes fewer steps than `fine`: the difference between the two is the estimate of the
-/// discretisation error of `fine`, of which it is a multiple when the order is reached. Together
-/// with the sampled rounding error it is the tolerance of the comparison.
+/// `coarse` takes fewer steps than `fine`: the difference between the two estimates the
+/// discretisation error of `fine`, of which it is a multiple in the asymptotic range. The tolerance
+/// is this difference plus the sampled rounding error.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -84,10 +83,10 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
     let interval = CheckedInterval::new::<M>(x0, u, p, h);
     let (nx, nw) = (M::Shape::NX, M::Shape::NW);
     let mut report = Report::new(format!("{} against the exact solution", type_name::<I>()));
-    // Elimination is stable in norm only: of a small entry beside large ones no more can be asked
-    // than some ε of the largest. Samples do not show this where a model is linear, since its
-    // matrices stay the same. Rounding errors of ε/2 in each of n steps add up to about √n ε/2: 3ε
-    // after 32 steps, and as in the other comparisons 4ε are granted.
+    // Elimination is stable in norm only: the error of a small entry may be a few ε of the largest
+    // one. Samples do not show this for a linear model, since its matrices are constant. Rounding
+    // errors of ε/2 in each of n steps accumulate to about √n ε/2: 3ε after 32 steps. The tolerance
+    // is 4ε, as in other comparisons.
     let largest_first = exact.first.iter().map(|row| largest_magnitude(row)).fold(0.0, f64::max);
     let largest_second = exact.second.iter().flatten().map(|row| largest_magnitude(row)).fold(0.0, f64::max);
     for i in 0..nx {
@@ -142,7 +141,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
             );
         }
         if let Some(second) = exact.second.get(i) {
-            // Both are symmetric: row-major or column-major is the same.
+            // Symmetric: row-major and column-major order are equal.
             let flat: Vec<f64> = second.iter().take(nw).flatten().copied().collect();
             let (own, rough) = (answer.hessian.as_slice(), rough.hessian.as_slice());
             compare("second derivative", own, rough, noise.hessian.as_slice(), &flat, largest_second, &|k| {

@@ -1,5 +1,5 @@
-//! Forward differentiation over any scalar: `Forward<Bounded>` yields rounding bounds of first
-//! derivatives, `Forward<Forward<Bounded>>` those of second derivatives.
+//! Forward differentiation over any scalar: `Forward<Bounded>` gives bounds of the rounding errors
+//! of first derivatives, `Forward<Forward<Bounded>>` those of second derivatives.
 
 use crate::scalar::{Field, Rows, Scalar, own_cell};
 use core::f64::consts::{LN_2, LN_10};
@@ -144,7 +144,7 @@ impl<S: Scalar> Scalar for Forward<S> {
     fn powf(self, other: Self) -> Self {
         let value = self.re.powf(other.re);
         let zero = from_constant::<S>(0.0);
-        // The logarithm does not exist for a negative base, which may have a constant exponent.
+        // The logarithm does not exist for a negative base, for which the exponent is constant.
         let by_exponent = S::select(S::eq(other.d, zero), zero, value * self.re.ln() * other.d);
         Self {
             re: value,

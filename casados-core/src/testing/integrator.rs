@@ -1,4 +1,4 @@
-//! What the checks ask of an integrator, and its answers as flat arrays.
+//! The calls of an integrator for the checks, with results as flat arrays.
 
 use crate::error::Error;
 use crate::integrator::Integrator;
@@ -22,7 +22,7 @@ impl CheckedInterval {
         Self { w: [x0.as_slice(), u.as_slice(), p.as_slice()].concat(), h }
     }
 
-    /// Sets the parameters, forgets the warm start, and returns `x₀` and `u`.
+    /// Sets the parameters, resets the warm start, and returns `x₀` and `u`.
     #[allow(clippy::type_complexity)]
     fn prepare<M: Dae>(
         &self,
@@ -45,7 +45,7 @@ impl CheckedInterval {
         Ok(states_of(integrator.solve(&x0, &u, self.h)?))
     }
 
-    /// `(x, z, z0)` and its derivatives by `w`.
+    /// `(x, z, z0)` and its derivatives with respect to `w`.
     pub fn forward<M: Dae>(
         &self,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
@@ -55,7 +55,7 @@ impl CheckedInterval {
         Ok((states_of(forward), matrix_of_forward(forward)))
     }
 
-    /// `(x, z, z0)` and the gradient by `w`.
+    /// `(x, z, z0)` and the gradient with respect to `w`.
     pub fn adjoint<M: Dae>(
         &self,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
@@ -67,7 +67,7 @@ impl CheckedInterval {
         Ok((states_of(adjoint), gradient.concat()))
     }
 
-    /// Everything in one call.
+    /// All results in one call.
     pub fn hessian<M: Dae>(
         &self,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
@@ -77,7 +77,7 @@ impl CheckedInterval {
         let result = integrator.hessian(&x0, &u, self.h, &vector_from(lambda))?;
         let gradient = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-        // The upper blocks are given; inside of the diagonal blocks, both triangles.
+        // The upper blocks are given; the diagonal blocks have both triangles.
         let element =
             |i: usize, j: usize| match (block_and_position(i, nx, nu), block_and_position(j, nx, nu)) {
                 ((0, i), (0, j)) => result.h_xx[(i, j)],
@@ -98,7 +98,7 @@ impl CheckedInterval {
     }
 }
 
-/// All that an integrator can say about an interval.
+/// All results of an integrator for an interval.
 #[derive(Clone, Debug)]
 pub(super) struct CallResults {
     /// `(x, z, z0)`
@@ -111,7 +111,7 @@ pub(super) struct CallResults {
     pub hessian: DMatrix<f64>,
 }
 
-/// Block of a direction of `w`, and its place there.
+/// The block of a direction of `w`, and its position in the block.
 const fn block_and_position(i: usize, nx: usize, nu: usize) -> (usize, usize) {
     if i < nx {
         (0, i)

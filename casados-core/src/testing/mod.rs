@@ -1,19 +1,18 @@
-//! Checks of models and integrators, for `cargo test` on a model of one's own.
+//! Checks of models and integrators, for `cargo test` in a user's crate.
 //!
 //! - [`check_derivatives`]: Jacobian, adjoint and Hessian of a model against `num-dual`, the
 //!   complex step and differences ([`check_by_differences`] for dual models); [`check_pattern`]:
-//!   zeros where zeros were declared, and nothing changes that was declared constant.
+//!   declared zeros and constants.
 //! - [`check_sensitivities`]: forward, adjoint and second-order sensitivities of an integrator
 //!   against each other and against differences of its solution; [`check_exact`]: against a closed
 //!   form.
-//! - [`convergence`]: an integrator against an exact solution, with the order that it reaches.
+//! - [`convergence`]: the order of convergence of an integrator, against an exact solution.
+//! - [`Bounded`] and [`Forward`]: scalars with a bound of their rounding error, or with a
+//!   derivative, for any code that is generic over [`Scalar`](crate::Scalar).
 //!
-//! - [`Bounded`] and [`Forward`]: scalars that carry a bound of their rounding error, or a
-//!   derivative, through any code that is generic over [`Scalar`](crate::Scalar).
-//!
-//! Every check returns a report that prints as a table and whose `assert` panics with it.
-//! Tolerances are not chosen: they are bounds of the rounding errors at the point in question, or
-//! estimates of truncation.
+//! Every check returns a report that is displayed as a table; its `assert` panics with it.
+//! Tolerances are not parameters: they are bounds of the rounding errors at each point, or
+//! estimates of truncation errors.
 
 mod bounded;
 mod convergence;

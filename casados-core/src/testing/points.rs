@@ -1,4 +1,4 @@
-//! Where a model is checked: given points, or random ones in given ranges.
+//! The points of a check: given ones, or random ones in given ranges.
 
 use crate::model::{ArrayV, Dae};
 use crate::shape::{Array, Shape};
@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 /// Points `v = (ẋ, x, z, u, p, t)` at which a model is checked.
 ///
-/// Random points are the same in every run: the generator has a fixed seed, which can be chosen.
+/// Random points are the same in every run: the generator has a fixed seed, which can be changed.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -30,8 +30,8 @@ pub struct Points<M: Dae> {
 }
 
 impl<M: Dae> Points<M> {
-    /// As many random points, every variable in its range of the model, [`Dae::RANGES`], or in
-    /// `[-1, 1]` if there is none, unless another one is set for it.
+    /// `count` random points, every variable in its range of the model, [`Dae::RANGES`], by default
+    /// in `[-1, 1]`, unless another range is set.
     #[must_use]
     pub fn random(count: usize) -> Self {
         let range = |variable: usize| {
@@ -42,13 +42,13 @@ impl<M: Dae> Points<M> {
         Self { given: Vec::new(), count, seed: 1, ranges: (0..M::Shape::NV).map(range).collect() }
     }
 
-    /// These points, `v = (ẋ, x, z, u, p, t)`.
+    /// The given points, `v = (ẋ, x, z, u, p, t)`.
     #[must_use]
     pub fn given(points: impl IntoIterator<Item = ArrayV<M, f64>>) -> Self {
         Self { given: points.into_iter().collect(), ..Self::random(0) }
     }
 
-    /// Random points around a given one: each variable within `radius · max(|v|, 1)` of it.
+    /// Random points around a given one: each variable within `radius · max(|v|, 1)`.
     #[must_use]
     pub fn around(point: &ArrayV<M, f64>, radius: f64, count: usize) -> Self {
         let mut points = Self::random(count);
@@ -59,54 +59,54 @@ impl<M: Dae> Points<M> {
         points
     }
 
-    /// Another sequence of random points.
+    /// Sets the seed of the random points.
     #[must_use]
     pub fn seed(mut self, seed: u64) -> Self {
         self.seed = seed;
         self
     }
 
-    /// The range of all variables.
+    /// Sets the range of all variables.
     #[must_use]
     pub fn all(mut self, range: RangeInclusive<f64>) -> Self {
         self.ranges.fill((*range.start(), *range.end()));
         self
     }
-    /// The range of `ẋ[i]`.
+    /// Sets the range of `ẋ[i]`.
     ///
     /// # Panics
-    /// If there is no such derivative. So do the others.
+    /// If the index is out of range; so do the methods for other variables.
     #[must_use]
     #[track_caller]
     pub fn xdot(self, i: usize, range: RangeInclusive<f64>) -> Self {
         self.set_range("xdot", (0, M::Shape::NX), i, &range)
     }
-    /// The range of `x[i]`.
+    /// Sets the range of `x[i]`.
     #[must_use]
     #[track_caller]
     pub fn x(self, i: usize, range: RangeInclusive<f64>) -> Self {
         self.set_range("x", (M::Shape::NX, M::Shape::NX), i, &range)
     }
-    /// The range of `z[i]`.
+    /// Sets the range of `z[i]`.
     #[must_use]
     #[track_caller]
     pub fn z(self, i: usize, range: RangeInclusive<f64>) -> Self {
         self.set_range("z", (2 * M::Shape::NX, M::Shape::NZ), i, &range)
     }
-    /// The range of `u[i]`.
+    /// Sets the range of `u[i]`.
     #[must_use]
     #[track_caller]
     pub fn u(self, i: usize, range: RangeInclusive<f64>) -> Self {
         self.set_range("u", (2 * M::Shape::NX + M::Shape::NZ, M::Shape::NU), i, &range)
     }
-    /// The range of `p[i]`.
+    /// Sets the range of `p[i]`.
     #[must_use]
     #[track_caller]
     pub fn p(self, i: usize, range: RangeInclusive<f64>) -> Self {
         let first = 2 * M::Shape::NX + M::Shape::NZ + M::Shape::NU;
         self.set_range("p", (first, M::Shape::NP), i, &range)
     }
-    /// The range of `t`.
+    /// Sets the range of `t`.
     #[must_use]
     pub fn t(self, range: RangeInclusive<f64>) -> Self {
         self.set_range("t", (M::Shape::NV - 1, 1), 0, &range)
@@ -126,7 +126,7 @@ impl<M: Dae> Points<M> {
         self
     }
 
-    /// The points, the given ones first; random ones are drawn one by one.
+    /// The points, the given ones first; random ones are generated on the fly.
     ///
     /// ```
     /// # use casados::prelude::*;
@@ -187,7 +187,7 @@ impl Random {
         2.0 * self.unit() - 1.0
     }
 
-    /// An integer in `0..n`; `n` is not zero.
+    /// An integer in `0..n`; `n` must not be zero.
     pub const fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }

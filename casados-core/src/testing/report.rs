@@ -1,14 +1,14 @@
-//! What a check found: a table, and the entries that are wrong.
+//! The result of a check: a table, and the wrong entries.
 
 use core::fmt;
 use std::string::String;
 use std::vec::Vec;
 
-/// How many wrong entries are listed by name.
+/// The maximum number of wrong entries listed by name.
 const MAX_LISTED_ENTRIES: usize = 12;
 
-/// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything
-/// is wrong.
+/// The result of a check. Displayed as a table; [`Report::assert`] panics with the table if an
+/// entry is wrong.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -26,13 +26,13 @@ const MAX_LISTED_ENTRIES: usize = 12;
 #[derive(Clone, Debug)]
 #[must_use = "a report says whether the check has passed: call `assert` or look at `passed`"]
 pub struct Report {
-    /// What was checked.
+    /// The subject of the check.
     pub title: String,
-    /// One row for each quantity and what it was compared with.
+    /// One row for each quantity and reference.
     pub rows: Vec<Row>,
-    /// The first entries that are wrong.
+    /// The first wrong entries.
     pub wrong: Vec<Deviation>,
-    /// What is not wrong, and hardly meant: a solution outside of the ranges of the model.
+    /// Warnings: a solution outside of the ranges of the model.
     pub warnings: Vec<String>,
 }
 
@@ -55,30 +55,30 @@ pub struct Report {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// What was compared.
+    /// The compared quantity.
     pub quantity: &'static str,
-    /// With what.
+    /// The reference.
     pub reference: &'static str,
-    /// Entries compared.
+    /// The number of compared entries.
     pub entries: usize,
-    /// Entries about which the comparison says nothing: neither side is finite, or there is no
-    /// bound of the error, or it is larger than a thousandth of the largest entry.
+    /// The number of inconclusive entries: neither side is finite, or the error bound is missing or
+    /// larger than a thousandth of the largest entry.
     pub inconclusive: usize,
-    /// Entries that are wrong.
+    /// The number of wrong entries.
     pub wrong: usize,
     /// The largest difference.
     pub difference: f64,
     /// The largest difference relative to its tolerance.
     pub ratio: f64,
-    /// The largest tolerance that was finite.
+    /// The largest finite tolerance.
     pub tolerance: f64,
     /// The largest entry.
     pub scale: f64,
 }
 
-/// An entry that is wrong.
+/// A wrong entry.
 ///
-/// What a check says of a closed form that is wrong:
+/// The deviation from a wrong closed form:
 ///
 /// ```
 /// use casados::prelude::*;
@@ -105,23 +105,23 @@ pub struct Row {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Deviation {
-    /// What was compared.
+    /// The compared quantity.
     pub quantity: &'static str,
-    /// With what.
+    /// The reference.
     pub reference: &'static str,
-    /// Which entry: equations and variables by name.
+    /// The entry: equations and variables by name.
     pub entry: String,
-    /// The number of the point.
+    /// The index of the point.
     pub point: usize,
-    /// What it is.
+    /// The value.
     pub value: f64,
-    /// What it should be.
+    /// The expected value.
     pub expected: f64,
-    /// How much it may differ.
+    /// The tolerance of the difference.
     pub tolerance: f64,
 }
 
-/// One entry to compare.
+/// An entry to be compared.
 pub(super) struct Entry {
     pub value: f64,
     pub expected: f64,
@@ -133,7 +133,7 @@ impl Report {
         Self { title, rows: Vec::new(), wrong: Vec::new(), warnings: Vec::new() }
     }
 
-    /// Whether nothing is wrong, and every row has said something.
+    /// Whether no entry is wrong, and every row has a conclusive entry.
     #[must_use]
     pub fn passed(&self) -> bool {
         !self.rows.is_empty()
@@ -143,13 +143,13 @@ impl Report {
                 .all(|row| row.wrong == 0 && (row.entries == 0 || row.inconclusive < row.entries))
     }
 
-    /// Panics with the report if anything is wrong.
+    /// Panics with the report if an entry is wrong.
     #[track_caller]
     pub fn assert(&self) {
         assert!(self.passed(), "{self}");
     }
 
-    /// Compares entries. `scale` is the largest entry; `name` names the entry of an index.
+    /// Compares entries. `scale` is the largest entry; `name` returns the name of an index.
     pub(super) fn compare(
         &mut self,
         quantity: &'static str,
@@ -185,7 +185,7 @@ impl Report {
                 continue;
             }
             row.tolerance = row.tolerance.max(tolerance);
-            // Written so that a NaN is wrong.
+            // NaN is wrong.
             if difference <= tolerance {
                 let silent = tolerance > 1e-3 * scale.max(expected.abs());
                 row.inconclusive += usize::from(silent && difference != 0.0);
@@ -213,7 +213,7 @@ impl Report {
     }
 }
 
-/// The larger one; NaN is the worst.
+/// The larger one; NaN is the largest.
 fn nan_max(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

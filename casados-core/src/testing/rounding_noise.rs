@@ -1,9 +1,9 @@
-//! What rounding does to results, and comparisons that allow for it.
+//! Rounding noise of results, and comparisons that allow for it.
 //!
-//! It is sampled: the interval is run again with every input changed by a few units in the last
-//! place, which draws all roundings anew (stochastic arithmetic: Vignes, "A stochastic arithmetic
-//! for reliable scientific computation", 1993). The largest deviation among the samples stands for
-//! condition times epsilon of that very entry.
+//! The noise is sampled: the interval is repeated with every input changed by a few units in the
+//! last place, which randomises all rounding errors (stochastic arithmetic: Vignes, "A stochastic
+//! arithmetic for reliable scientific computation", 1993). The largest deviation of the samples
+//! estimates the condition number times epsilon of each entry.
 
 use super::bounded::Bounded;
 use super::integrator::{CallResults, CheckedInterval};
@@ -16,15 +16,15 @@ use crate::model::Dae;
 use std::string::String;
 use std::vec::Vec;
 
-/// Runs with changed inputs.
+/// The number of runs with changed inputs.
 const SAMPLES: usize = 8;
 
-/// Deviations that a difference of two results may have. The largest of eight samples is below one
-/// standard deviation once in twenty entries and below a quarter once in four hundred thousand: 32
-/// of it are at least eight standard deviations.
+/// Tolerance of a difference of two results, in sampled deviations. The largest of eight samples is
+/// below one standard deviation once in twenty entries and below a quarter once in four hundred
+/// thousand: 32 deviations are at least eight standard deviations.
 pub(super) const MAX_DEVIATIONS: f64 = 32.0;
 
-/// The largest deviation of each entry over samples.
+/// The largest deviation of each entry over all samples.
 pub(super) fn measure_noise<M: Dae>(
     integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     interval: &CheckedInterval,
@@ -56,7 +56,7 @@ pub(super) fn measure_noise<M: Dae>(
     Ok(noise)
 }
 
-/// Two results of the same quantity within the noise.
+/// Compares two results for the same quantity, up to the noise.
 pub(super) fn compare_results(
     report: &mut Report,
     quantity: &'static str,
@@ -90,7 +90,7 @@ pub(super) fn compare_with_differences(
     report.compare(quantity, "differences", 0, largest_magnitude(values), entries.enumerate(), name);
 }
 
-/// Values with their noise; NaN where the integrator failed, which differences leave out.
+/// Values with their noise; NaN if the integrator failed, which differences skip.
 pub(super) fn values_with_noise(values: Option<Vec<f64>>, noise: &[f64]) -> Vec<Bounded> {
     match values {
         Some(values) => values

@@ -1,4 +1,4 @@
-//! The sensitivities of an integrator against each other and against differences.
+//! Checks of the sensitivities of an integrator against each other and against differences.
 
 use super::bounded::Bounded;
 use super::differences;
@@ -22,16 +22,16 @@ use std::string::String;
 use std::vec::Vec;
 
 /// Checks one interval of an integrator:
-/// - repeated calls return the same bits, and all calls agree about what they share;
-/// - forward sensitivities against differences of the solution, and adjoint ones against both
+/// - repeated calls are bitwise equal, and all calls agree in their common results;
+/// - forward sensitivities agree with differences of the solution, and adjoint ones with both
 ///   (`λᵀ (S v) = (Sᵀ λ)ᵀ v` for all `v`);
 /// - the Hessian is symmetric, and agrees with differences of the gradient.
 ///
-/// The report warns where a state, differential or algebraic, is outside of its `range(..)` of the
-/// model: of several roots of the equations the integrator may have taken another one than is
-/// meant.
+/// The report has a warning if a differential or algebraic state is outside of its `range(..)` of
+/// the model: the integrator may have found an unintended root of the equations.
 ///
-/// Errors are those of the integrator at the given inputs.
+/// # Errors
+/// Those of the integrator at the given inputs.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -98,7 +98,7 @@ pub fn check_sensitivities<
         |i| format!("by {}", direction_name::<M>(i)),
     );
 
-    // λᵀ S, with the noise of both sides.
+    // `λᵀ S`, with the noise of both sides.
     let nx = M::Shape::NX;
     let product = |s: &DMatrix<f64>, absolute: bool| -> Vec<f64> {
         (0..M::Shape::NW)
@@ -137,7 +137,7 @@ pub fn check_sensitivities<
     Ok(report)
 }
 
-/// What the calls have given.
+/// The results of the calls.
 struct CallRecord<'a> {
     states: &'a [f64],
     derivatives: &'a DMatrix<f64>,
@@ -146,7 +146,7 @@ struct CallRecord<'a> {
 }
 
 impl CallRecord<'_> {
-    /// The same calls once more, which give the same bits.
+    /// Checks that repeated calls are bitwise equal.
     fn check_repeated_calls<M: Dae>(
         &self,
         report: &mut Report,
@@ -177,7 +177,7 @@ impl CallRecord<'_> {
         Ok(())
     }
 
-    /// Differences of states and of gradients, in some directions.
+    /// Checks differences of states and of gradients in several directions.
     fn check_differences<M: Dae>(
         &self,
         report: &mut Report,
@@ -209,7 +209,7 @@ impl CallRecord<'_> {
     }
 }
 
-/// Warns where states `(x, z, z0)` are outside of the ranges of the model.
+/// Adds a warning for states `(x, z, z0)` outside of the ranges of the model.
 pub(super) fn warn_outside_ranges<M: Dae>(report: &mut Report, states: &[f64]) {
     let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
     for (i, &value) in states.iter().enumerate() {
@@ -225,14 +225,14 @@ pub(super) fn warn_outside_ranges<M: Dae>(report: &mut Report, states: &[f64]) {
     }
 }
 
-/// A direction in the space of `w`, in which differences are taken.
+/// A direction of differences in the space of `w`.
 struct Direction {
     name: String,
     seed: Vec<f64>,
 }
 
-/// The unit vectors, if they are few; for large models random directions, in which every entry
-/// takes part.
+/// The unit vectors for small models; random directions, in which every entry takes part, for large
+/// ones.
 fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
     const MAX_UNIT_DIRECTIONS: usize = 12;
     const RANDOM_DIRECTIONS: usize = 4;
@@ -255,7 +255,8 @@ fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
 }
 
 impl Direction {
-    /// The derivatives in this direction, and their noise: that of the entries and that of the sum.
+    /// The derivatives in this direction, and their noise: that of the entries plus that of the
+    /// sum.
     fn directional_derivatives(&self, matrix: &DMatrix<f64>, noise: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
         let n = self.seed.len() as f64;
         let sum = |term: &dyn Fn(usize, f64) -> f64| -> f64 {

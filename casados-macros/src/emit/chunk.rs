@@ -1,6 +1,6 @@
-//! Long functions in pieces: a function of many thousands of statements takes a compiler more than
-//! linear time, and a debug build the whole stack. Values that cross a cut go through an array, in
-//! which a slot is reused as soon as its value has been read for the last time.
+//! Splits long functions into pieces: compilers take more than linear time for a function of many
+//! thousands of statements, and a debug build exhausts the stack. Values that cross a cut are
+//! stored in an array, whose slots are reused after the last read.
 
 use super::schedule::{Statement, is_leaf};
 use crate::graph::{Graph, Node, Op};
@@ -19,13 +19,13 @@ pub struct Plan {
 pub struct Chunk {
     /// Its statements.
     pub steps: Range<usize>,
-    /// Values of earlier pieces and the slots they are in: read at the start.
+    /// Values of earlier pieces and their slots, read at the start.
     pub loads: Vec<(Node, usize)>,
-    /// Values for later pieces and the slots they go to: written as soon as they are computed.
+    /// Values for later pieces and their slots, written as soon as they are computed.
     pub spills: HashMap<Node, usize>,
 }
 
-/// What a statement computes.
+/// The nodes that a statement computes.
 pub fn computed(step: Statement) -> impl Iterator<Item = Node> {
     let list = match step {
         Statement::Compute(node) => [Some((node, None)), None, None, None],
@@ -36,7 +36,7 @@ pub fn computed(step: Statement) -> impl Iterator<Item = Node> {
     list.into_iter().flatten().flat_map(|(node, other)| [node].into_iter().chain(other))
 }
 
-/// What a statement reads, leaves included.
+/// The nodes that a statement reads, leaves included.
 pub fn read(graph: &Graph, outputs: &[Node], step: Statement) -> impl Iterator<Item = Node> {
     let (stored, ops) = match step {
         Statement::Compute(node) | Statement::SinCos(node, _) => {
@@ -50,7 +50,7 @@ pub fn read(graph: &Graph, outputs: &[Node], step: Statement) -> impl Iterator<I
 
 /// Cuts a function into pieces of at most `limit` statements.
 pub fn plan(graph: &Graph, outputs: &[Node], steps: &[Statement], limit: usize) -> Plan {
-    // First and last statement that a value occurs in.
+    // The first and last statement in which a value occurs.
     let mut life: HashMap<Node, (usize, usize)> = HashMap::new();
     for (position, &step) in steps.iter().enumerate() {
         for node in read(graph, outputs, step).filter(|&node| !is_leaf(graph.op(node))) {
@@ -104,7 +104,7 @@ pub fn plan(graph: &Graph, outputs: &[Node], steps: &[Statement], limit: usize) 
     Plan { chunks, slots }
 }
 
-/// Where to cut: in the last third of what a piece may hold, where the fewest values cross.
+/// The cuts: in the last third of a full piece, where the fewest values cross.
 fn cuts(life: &HashMap<Node, (usize, usize)>, length: usize, limit: usize) -> Vec<usize> {
     if length <= limit {
         return Vec::new();
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
     use crate::graph::{Binary, Unary};
 
-    /// Runs the pieces on symbolic memory: every value that is read is the one that was meant.
+    /// Runs the pieces on symbolic memory, and checks that every value read is the intended one.
     fn check(graph: &Graph, outputs: &[Node], limit: usize) -> Plan {
         let steps = schedule(graph, outputs);
         let plan = plan(graph, outputs, &steps, limit);
@@ -167,7 +167,7 @@ mod tests {
         plan
     }
 
-    /// Values that are used soon, and some that are used late.
+    /// A graph with values of short and of long lifetimes.
     fn graph(length: u32) -> (Graph, Vec<Node>) {
         let mut g = Graph::default();
         let mut recent: Vec<Node> = (0..4).map(|index| g.variable(index)).collect();
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn slots_are_reused() {
-        // One value is alive at any cut, so one slot is enough for any number of pieces.
+        // At most one value crosses any cut, so that one slot suffices for any number of pieces.
         let mut g = Graph::default();
         let mut node = g.variable(0);
         for _ in 0..1000 {

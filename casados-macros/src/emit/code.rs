@@ -1,5 +1,5 @@
-//! What the implementations for a model and for a function have in common: a module with the
-//! functions that compute.
+//! The common part of the implementations for models and functions: a module with the computing
+//! functions.
 
 use super::routine::{OuterConstants, Routine};
 use crate::graph::Node;
@@ -8,11 +8,11 @@ use crate::structure::Derivatives;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-/// What the functions that compute are called.
+/// The names of the computing functions.
 pub struct Names {
-    /// The function of the values,
+    /// The function that computes the values.
     pub value: &'static str,
-    /// of the values and the Jacobian.
+    /// The function that computes the values and the Jacobian.
     pub value_jacobian: &'static str,
     /// The array of the values.
     pub output: &'static str,
@@ -20,11 +20,11 @@ pub struct Names {
     pub symbol: &'static str,
 }
 
-/// Of a model.
+/// The names for a model.
 pub const MODEL: Names =
     Names { value: "residual", value_jacobian: "residual_jacobian", output: "f", symbol: "f" };
 
-/// Of a function.
+/// The names for a function.
 pub const FUNCTION: Names =
     Names { value: "value", value_jacobian: "value_jacobian", output: "y", symbol: "y" };
 
@@ -35,7 +35,7 @@ pub fn model_type(model: &Model) -> TokenStream {
     if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) }
 }
 
-/// The module `code`, with one more function if there is one.
+/// The module `code`, with an optional additional function.
 pub fn module(
     model: &Model,
     derivatives: &Derivatives,
@@ -63,8 +63,8 @@ fn of(model: &Model) -> OuterConstants<'_> {
     OuterConstants { constants: model.opaque.len(), tables: &model.tables }
 }
 
-/// What the functions that compute are given from outside: the module of the code sees no name of
-/// the user's.
+/// The constants and tables passed to the computing functions: their module does not see the user's
+/// names.
 pub fn outer_arguments(model: &Model) -> Option<TokenStream> {
     let constants = (!model.opaque.is_empty()).then(|| quote!(&C,));
     let tables = (0..model.tables.len()).map(type_of_table);
@@ -75,8 +75,8 @@ fn type_of_table(index: usize) -> syn::Ident {
     quote::format_ident!("CasadosTable{index}")
 }
 
-/// The implementations where no name of theirs meets one of the user's; constants from outside are
-/// `C`.
+/// Encloses the implementations, so that their names do not collide with the user's; constants from
+/// outside are `C`.
 pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
     let Model { opaque, uses, instance, tables, .. } = model;
     if opaque.is_empty() && tables.is_empty() {
@@ -113,8 +113,7 @@ pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
     }
 }
 
-/// A type that stands for a table. A function that is generic would have numbers of its own for
-/// each scalar.
+/// A type that represents a table. A generic function would repeat its numbers for each scalar.
 fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> TokenStream {
     let (krate, ty, expression) = (&model.krate, type_of_table(index), &table.expression);
     let variables = Literal::usize_unsuffixed(table.variables);
@@ -138,8 +137,7 @@ fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> Tok
     }
 }
 
-/// The functions that compute, as text: they are long and simple, and a parser is faster than a
-/// quote.
+/// The computing functions as text: they are long and simple, and parsing is faster than `quote`.
 fn functions_as_text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
     let Model { variables, graph, residual, .. } = model;
@@ -167,7 +165,7 @@ fn functions_as_text(model: &Model, derivatives: &Derivatives, names: &Names) ->
             .map(|(index, ((_, _, node), _))| ("jacobian", index, *node))
             .collect(),
     });
-    // Row after row: what an equation and its derivatives share is used soon.
+    // Row by row: values shared by an equation and its derivatives are used soon.
     let mut rows: Vec<Vec<(&str, usize, Node)>> = equations().map(|store| vec![store]).collect();
     for (index, ((row, _, node), constant)) in entries() {
         if let (false, Some(stores)) = (*constant, rows.get_mut(*row as usize)) {
@@ -198,7 +196,7 @@ fn functions_as_text(model: &Model, derivatives: &Derivatives, names: &Names) ->
     [code_residual, code_constants, code_jacobian, code_adjoint, code_hessian].concat()
 }
 
-/// Columns of panels of directions are computed so many at a time.
+/// The width of panels of directions.
 const PANEL: usize = 8;
 
 /// `NK`, `NV`, `NW` and `NC`.
@@ -209,7 +207,7 @@ pub fn dimensions(variables: &Variables) -> [usize; 4] {
     [nx + nz, 2 * nx + nz + nu + np + 1, nw, panel_columns(nw)]
 }
 
-/// `NC` for so many directions: whole panels.
+/// `NC` for `nw` directions: whole panels.
 pub fn panel_columns(nw: usize) -> usize {
     nw.next_multiple_of(PANEL)
 }

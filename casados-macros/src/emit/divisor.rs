@@ -1,32 +1,32 @@
-//! Division by a constant in two operations, with the bits of a quotient.
+//! Division by a constant in two operations, bitwise equal to the quotient.
 //!
-//! A division takes a processor as long as ten products. With `1/c ≈ h + l`, `h` not beyond `1/c`,
-//! so that both have one sign and infinities and zeros stay what they are,
+//! A division takes as long as ten products. With `1/c ≈ h + l`, where `|h| ≤ |1/c|`, so that both
+//! have one sign and infinities and zeros are preserved, a fused product gives
 //!
 //! ```text
 //! x/c = RN(h x + RN(l x))
 //! ```
 //!
-//! by a fused product, for all `x` (but for results next to the least and the largest numbers), if
-//! it holds for the few whose quotient is so close to the middle of two doubles that the error of
-//! the sum before it is rounded may carry it over. These are found and tried, and if one of them
-//! fails, with the next `h` and `l`. N. Brisebarre, J.-M. Muller, S. K. Raina, "Accelerating
-//! correctly rounded floating-point division when the divisor is known in advance", IEEE
-//! Transactions on Computers 53 (2004).
+//! for all `x`, except for results next to the smallest and the largest numbers. It suffices to
+//! verify the few `x` whose quotient is so close to the midpoint of two doubles that the error of
+//! the sum may change the rounding. They are enumerated and tested; if one of them fails, the next
+//! `h` and `l` are tried. N. Brisebarre, J.-M. Muller, S. K. Raina, "Accelerating correctly rounded
+//! floating-point division when the divisor is known in advance", IEEE Transactions on Computers 53
+//! (2004).
 
 /// Significant bits of a double.
 const DIGITS: u32 = f64::MANTISSA_DIGITS;
-/// So many units of `1/(2ᵏ C)`, below, are close.
+/// Quotients within this many units of `1/(2ᵏ C)` of a midpoint are verified.
 const CLOSE: u128 = 64;
 
-/// `[h, l]`, if quotients by `c` are what is said above.
+/// `[h, l]`, if quotients by `c` are bitwise equal.
 pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
-    // Beyond these `l x` would often be less than the least number.
+    // For other `c` the product `l x` would often underflow.
     if !(1e-100..1e100).contains(&c.abs()) {
         return None;
     }
     let nearest = 1.0 / c;
-    // What a quotient that is rounded to nearest or to zero leaves is a double.
+    // The remainder of a quotient rounded to nearest or to zero is a double.
     let rest = |high: f64| (-high).mul_add(c, 1.0);
     let below = u64::from(rest(nearest) < 0.0);
     let hard: Vec<f64> = hard_cases(c).collect();
@@ -40,16 +40,17 @@ pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
     })
 }
 
-/// All `x` of `2⁵² .. 2⁵³` whose quotient by `c` is within 2⁻¹⁰¹ of itself of the middle between
-/// two doubles, and some more.
+/// All `x` in `2⁵² .. 2⁵³` whose quotient by `c` is within a relative distance of 2⁻¹⁰¹ of the
+/// midpoint of two doubles, and some more.
 ///
-/// (Where `h` is up to three units in the last place, 3 · 2⁻⁵² of itself, below `1/c`, and `l` one
-/// and a half of its own away from what is left, the sum lacks 4.5 · 2⁻¹⁰⁴ of itself, and rounding
-/// `l x` changes it by 1.5 · 2⁻¹⁰⁴.)
+/// (If `h` is up to three units in the last place, a relative error of 3 · 2⁻⁵², below `1/c`, and
+/// `l` has an error of one and a half of its units, the relative error of the sum is 4.5 · 2⁻¹⁰⁴,
+/// and the rounding of `l x` adds 1.5 · 2⁻¹⁰⁴.)
 ///
-/// With the integers `X = x` and `C` of the significant digits such a middle is `M/2ᵏ`, `k = 53` if
-/// `X ≥ C` and else `k = 54`, and `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`: `2ᵏ X = d`
-/// modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of `2ᵏ`.)
+/// With the integers `X = x` and `C` of the significant digits a midpoint is `M/2ᵏ`, `k = 53` if
+/// `X ≥ C` and otherwise `k = 54`, and `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`:
+/// `2ᵏ X = d` modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of
+/// `2ᵏ`.)
 fn hard_cases(c: f64) -> impl Iterator<Item = f64> {
     let digits = u128::from(c.to_bits() & ((1 << (DIGITS - 1)) - 1) | 1 << (DIGITS - 1));
     let twos = digits.trailing_zeros();
@@ -84,7 +85,7 @@ mod tests {
         state.wrapping_mul(0x2545_F491_4F6C_DD1D)
     }
 
-    /// Any number of moderate size.
+    /// A number of moderate magnitude.
     fn random_number(state: &mut u64) -> f64 {
         let (bits, exponent) = (random(state), random(state) % 200);
         f64::from_bits(bits & (1 << 63 | ((1 << 52) - 1)) | (923 + exponent) << 52)
@@ -114,7 +115,7 @@ mod tests {
         }
     }
 
-    /// The search is tried on its own definition.
+    /// The enumeration is compared with its definition.
     #[test]
     fn hard_cases_are_hard_and_others_are_not() {
         let mut state = 0x2545_F491_4F6C_DD1D;

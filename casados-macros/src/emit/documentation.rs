@@ -1,10 +1,11 @@
-//! What rustdoc says about a model.
+//! The rustdoc text of a model.
 
 use crate::structure::{Analysis, Derivatives, FunctionAnalysis, times};
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// The user's text, then what is known about the model: one row of a table for each instance.
+/// The user's text, followed by the properties of the model: a table with one row for each
+/// instance.
 pub fn type_documentation(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
     let Some(first) = models.first() else {
         return TokenStream::new();
@@ -53,7 +54,7 @@ pub fn type_documentation(original: &syn::Ident, models: &[Analysis]) -> TokenSt
     }
 }
 
-/// What was differentiated, and where the result is singular.
+/// The differentiated equations, and the sample points at which the result is singular.
 fn reduction_documentation(analysis: &Analysis) -> Option<String> {
     let reduction = analysis.reduction.as_ref()?;
     let list = reduction.differentiated.iter();
@@ -76,7 +77,7 @@ fn reduction_documentation(analysis: &Analysis) -> Option<String> {
     Some(text)
 }
 
-/// The user's text, then what is known about the function.
+/// The user's text, followed by the properties of the function.
 pub fn function_documentation<'a>(functions: impl Iterator<Item = &'a FunctionAnalysis>) -> TokenStream {
     let functions: Vec<_> = functions.collect();
     let Some(first) = functions.first() else {

@@ -1,11 +1,11 @@
-//! Where a model lives, for the engine: start values of Newton's method, and ranges.
+//! The domain of a model: initial guesses of Newton's method, and ranges.
 
 use crate::language::{Sampling, Variables};
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything.
-/// `is_nonlinear` tells whether equations may be nonlinear in an unknown `(ẋ, z)`.
+/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute sets them. `is_nonlinear`
+/// tells whether equations may be nonlinear in an unknown `(ẋ, z)`.
 pub fn write(
     krate: &syn::Path,
     variables: &Variables,
@@ -14,8 +14,8 @@ pub fn write(
 ) -> TokenStream {
     let (nx, nz) = (variables.x.len(), variables.z.len());
     let sampling = |variable: usize| samplings.get(variable).copied().unwrap_or_default();
-    // Of a derivative zero is as good as any value, unless it chooses between roots: states are
-    // then `x₀` at all stages.
+    // The value of a derivative matters only if it selects a root; otherwise it is zero, so that
+    // states are `x₀` at all stages.
     let starts: Vec<f64> = (0..nx + nz)
         .map(|unknown| match unknown {
             derivative if derivative < nx && !is_nonlinear(derivative) => 0.0,
@@ -37,8 +37,7 @@ pub fn write(
     quote!(#starts #ranges)
 }
 
-/// The nominal value; without one zero, or, where a range does not contain it, the range's
-/// geometric mean.
+/// The nominal value; without one zero or, if a range excludes zero, its geometric mean.
 fn start(Sampling { nominal, range }: Sampling) -> f64 {
     match (nominal, range) {
         (Some(nominal), _) => nominal,

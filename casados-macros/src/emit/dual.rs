@@ -8,7 +8,7 @@ use crate::language::{Form, Variables};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-/// What rustdoc says about the model.
+/// The rustdoc text of the model.
 pub fn documentation(model: &Model) -> TokenStream {
     let Model { documentation, function, variables, .. } = model;
     let separator = (!documentation.is_empty()).then(|| quote!(#[doc = ""]));
@@ -20,7 +20,7 @@ pub fn documentation(model: &Model) -> TokenStream {
         variables.u.len(),
         variables.p.len(),
     );
-    // Dimensions of an instance do not speak for all of them.
+    // The dimensions of one instance are not those of all.
     let text = if model.instance.is_empty() {
         text
     } else {
@@ -29,21 +29,21 @@ pub fn documentation(model: &Model) -> TokenStream {
     quote!(#(#documentation)* #separator #[doc = #text])
 }
 
-/// Numbers of a dense model.
+/// The dimensions of a dense model.
 struct DenseSizes {
     nx: usize,
     nz: usize,
     nu: usize,
     np: usize,
-    /// Equations,
+    /// The number of equations.
     nk: usize,
-    /// variables,
+    /// The number of variables.
     nv: usize,
-    /// directions,
+    /// The number of directions.
     nw: usize,
-    /// entries of the Jacobian,
+    /// The number of entries of the Jacobian.
     nj: usize,
-    /// entries of the Hessian.
+    /// The number of entries of the Hessian.
     nh: usize,
 }
 
@@ -83,7 +83,7 @@ pub fn write(model: &Model) -> TokenStream {
     }
 }
 
-/// The call of the function, over any dual number.
+/// The call of the function, with any dual number type.
 fn dual_model(model: &Model, sizes: &DenseSizes, ty: &TokenStream) -> TokenStream {
     let Model { form, function, krate, generics, .. } = model;
     let &DenseSizes { nx, nz, nu, nv, .. } = sizes;
@@ -186,7 +186,7 @@ fn dae(model: &Model, sizes: &DenseSizes, ty: &TokenStream) -> TokenStream {
     }
 }
 
-/// The structure of a model of which nothing is known: everything is dense.
+/// The structure of a model without known properties: dense.
 fn structure(model: &Model, sizes: &DenseSizes) -> TokenStream {
     let Model { name, variables, krate, .. } = model;
     let &DenseSizes { nx, nz, nu, np, nk, nv, nw, nj, .. } = sizes;
@@ -247,7 +247,7 @@ fn structure(model: &Model, sizes: &DenseSizes) -> TokenStream {
     }
 }
 
-/// An argument of the call: an array of its variables, or what is made of it.
+/// An argument of the call: an array of its variables, or a value built from it.
 fn argument(argument: &Argument, starts: [usize; 6]) -> TokenStream {
     let start = match argument.role {
         Role::Xdot => starts[0],

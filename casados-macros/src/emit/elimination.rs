@@ -1,5 +1,5 @@
-//! The constant `Structure::elimination`: the tables by which the Newton matrix is eliminated,
-//! printed.
+//! The constant `Structure::elimination`: the tables of the elimination of the Newton matrix, as
+//! tokens.
 
 use super::structure::index_literals;
 use crate::structure::tables::{Assembly, KinematicDependence, Pivot, Tables, Update};
@@ -35,7 +35,7 @@ pub fn write(krate: &syn::Path, tables: &Tables) -> TokenStream {
     }}
 }
 
-/// Functions with short calls, of which the tables are made.
+/// Functions with short names, which build the tables.
 fn constructors() -> TokenStream {
     quote! {
         const fn pivot(
@@ -67,7 +67,7 @@ fn constructors() -> TokenStream {
     }
 }
 
-/// A call with numbers only.
+/// A call with integer arguments.
 fn constructor_call(constructor: &str, values: &[u32]) -> TokenStream {
     let constructor = quote::format_ident!("{constructor}");
     let values = index_literals(values);

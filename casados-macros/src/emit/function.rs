@@ -95,7 +95,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     }
 }
 
-/// Functions over any scalar, of slices.
+/// The functions over any scalar, with slices as arguments.
 fn graph_function(model: &Model, c: &Option<TokenStream>) -> TokenStream {
     let (krate, ty, [_, nv, ..]) = (&model.krate, model_type(model), dimensions(&model.variables));
     let last = Literal::usize_unsuffixed(nv - 1);

@@ -1,4 +1,4 @@
-//! From graphs and structure to Rust.
+//! Code generation: from graphs and structure to Rust.
 
 mod chunk;
 mod code;
@@ -23,9 +23,9 @@ use crate::structure::{Analysis, FunctionAnalysis};
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
 
-/// Models or functions that one function was read as, with the name of that.
+/// The models or functions read from one Rust function.
 pub enum ReadItem {
-    /// Models.
+    /// Models, with the name of the Rust function.
     Models(syn::Ident, Vec<Analysis>),
     /// Functions of a model's variables.
     Functions(Vec<FunctionAnalysis>),
@@ -62,7 +62,7 @@ pub fn expand(item: TokenStream, place: Place, parts: &[ReadItem]) -> syn::Resul
     assemble(item, place, &types, implementations)
 }
 
-/// The type of functions, whose implementations are added.
+/// The type of a function; its implementations are appended.
 fn functions<'a>(
     functions: impl Iterator<Item = &'a FunctionAnalysis> + Clone,
     implementations: &mut TokenStream,
@@ -74,7 +74,7 @@ fn functions<'a>(
     Ok(functions.clone().next().map(|first| Type::of(&first.model, documentation)))
 }
 
-/// The same for dual models.
+/// As [`expand`], for dual models.
 pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
     let language::dual::Source { item, place, models } = source;
     let Some(language::dual::Model { name, visibility, instance, .. }) = models.first() else {
@@ -85,7 +85,7 @@ pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
     assemble(item, place, &[Type { name, visibility, documentation, instance }], implementations)
 }
 
-/// The item with `sin`, `exp` and the like in scope, which `f64` has only where there is `std`.
+/// The item with `sin`, `exp` etc. in scope, which `f64` has with `std` only.
 fn with_elementary_functions(item: TokenStream, krate: &syn::Path) -> TokenStream {
     let import = quote! {
         #[allow(unused_imports)]
@@ -109,7 +109,7 @@ impl<'a> Type<'a> {
     }
 }
 
-/// The item, the types and their implementations, where they belong.
+/// Assembles the item, the types and their implementations.
 fn assemble(
     item: TokenStream,
     place: Place,
@@ -126,7 +126,7 @@ fn assemble(
         }
     };
     match place {
-        // A model may be all that its function is for.
+        // The function itself may be unused.
         Place::Beside => {
             let declarations = types.iter().map(|ty| declaration(ty, &ty.visibility.to_token_stream()));
             Ok(quote! {
@@ -160,9 +160,9 @@ fn assemble(
     }
 }
 
-/// The item as it was written beside its errors, and the names of its types: without them, every
-/// use of the models would be an error more. The first stands for a type that has the first error
-/// inside of itself, of which the compiler says nothing else, and the others for that type.
+/// The item as written with its errors and stubs of its types, so that uses of the models cause no
+/// further errors. The first stub contains the first error, which suppresses other errors about it;
+/// the others refer to the first.
 pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error) -> TokenStream {
     let mut errors = error.clone().into_iter().map(|error| error.to_compile_error());
     let Some((name, original)) = named_item(&item) else { return quote!(#item #(#errors)*) };
@@ -178,7 +178,7 @@ pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error
     };
     let name = language::model_name(attribute, &name);
     match original {
-        // In an `impl` there is no place for a type.
+        // An `impl` block cannot contain a type.
         syn::Item::Fn(function) if function.sig.receiver().is_none() => {
             let first = errors.next();
             let stub = stub(&function.vis, &parameters(&function.sig.generics), &name, quote!([(); #first]));

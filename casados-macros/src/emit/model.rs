@@ -115,7 +115,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     }
 }
 
-/// Functions over any scalar, of slices.
+/// The functions over any scalar, with slices as arguments.
 fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
     let (krate, ty, [_, nv, ..]) = (&model.krate, model_type(model), dimensions(&model.variables));
     let time = Literal::usize_unsuffixed(nv - 1);
@@ -140,7 +140,7 @@ fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
     }
 }
 
-/// Of an explicit model its rows.
+/// The implementation of `Ode` of an explicit model, with its rows.
 fn ode(analysis: &Analysis) -> Option<TokenStream> {
     let Analysis { model, explicit, .. } = analysis;
     let (krate, ty) = (&model.krate, model_type(model));
@@ -159,17 +159,17 @@ fn ode(analysis: &Analysis) -> Option<TokenStream> {
     })
 }
 
-/// The function of the invariants of a model whose index was reduced.
+/// The function of the invariants of an index-reduced model.
 pub fn invariants(analysis: &Analysis) -> Option<&FunctionAnalysis> {
     analysis.reduction.as_ref().map(|reduction| &reduction.invariants)
 }
 
-/// The equations of the projection onto them.
+/// The equations of the projection onto the invariants.
 pub fn projection(analysis: &Analysis) -> Option<&FunctionAnalysis> {
     analysis.reduction.as_ref().and_then(|reduction| reduction.projection.as_ref())
 }
 
-/// What connects a model with the functions of its invariants.
+/// Associates a model with the functions of its invariants.
 pub fn constrained(analysis: &Analysis) -> Option<TokenStream> {
     let (model, invariants) = (model_type(&analysis.model), model_type(&invariants(analysis)?.model));
     let krate = &analysis.model.krate;

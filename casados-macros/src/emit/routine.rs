@@ -10,11 +10,11 @@ use crate::language::{self, Variables};
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
-/// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
-/// takes longer over all of them in one, and spills more registers there than the calls cost.
+/// Maximum number of statements of a function. The pieces of a longer routine are not inlined: a
+/// single function would take longer to compile, and spill more registers than the calls cost.
 const MAX_STATEMENTS: usize = 500;
 
-/// What a model has from outside.
+/// The constants and tables of a model from outside.
 #[derive(Clone, Copy)]
 pub struct OuterConstants<'a> {
     /// The number of its constants.
@@ -33,7 +33,7 @@ pub struct Routine<'a> {
     pub inputs: &'a [(&'a str, usize)],
     /// The arrays it writes: name and length.
     pub outputs: &'a [(&'a str, usize)],
-    /// What it writes: array, element, value.
+    /// The stores: array, element, value.
     pub stores: Vec<(&'a str, usize, Node)>,
 }
 
@@ -82,17 +82,17 @@ struct Writer<'a> {
     variables: &'a Variables,
     outside: OuterConstants<'a>,
     outputs: &'a [Node],
-    /// Number of the local variable of each node.
+    /// The index of the local variable of each node.
     names: &'a [u32],
-    /// How often each node is read.
+    /// The number of reads of each node.
     uses: &'a [u32],
-    /// Values of earlier pieces that this one reads once, out of their slots.
+    /// Values of earlier pieces that are read once, directly from their slots.
     in_place: HashMap<Node, usize>,
 }
 
 impl Writer<'_> {
-    /// What a piece is given: name and type of each argument, with a lifetime or without. Tables
-    /// are values of types without numbers.
+    /// The arguments of a piece: name and type, with or without a lifetime. Tables are values of
+    /// types of size zero.
     fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(String, String)> {
         let Routine { inputs, outputs, .. } = self.routine;
         let OuterConstants { constants, tables } = self.outside;
@@ -117,7 +117,7 @@ impl Writer<'_> {
         parameters
     }
 
-    /// Arguments for them.
+    /// The generic arguments of these.
     fn generic_arguments(&self) -> String {
         let mut types = String::from("S");
         for k in 0..self.outside.tables.len() {
@@ -131,9 +131,9 @@ impl Writer<'_> {
         format!("Piece_{}_{number}", self.routine.name)
     }
 
-    /// The function that runs the pieces.
+    /// Writes the function that calls the pieces.
     fn write_driver(&self, text: &mut String, plan: &Plan) {
-        // Who calls it names the scalar alone.
+        // Callers name the scalar only.
         let mut parameters: Vec<String> =
             self.arguments(0, "").iter().map(|(name, ty)| format!("{name}: {ty}")).collect();
         for (k, table) in self.outside.tables.iter().enumerate() {
@@ -176,7 +176,7 @@ impl Writer<'_> {
         self.write_loads(text, steps, piece);
         let mut steps = steps.iter().copied().peekable();
         while let Some(step) = steps.next() {
-            // A value that is stored and nothing else needs no name.
+            // A value that is only stored needs no name.
             if let Statement::Compute(node) = step
                 && let Some(Statement::Store(output)) =
                     steps.next_if(|next| self.uses[node.at()] == 1 && self.stores(*next, node))
@@ -195,7 +195,7 @@ impl Writer<'_> {
         matches!(step, Statement::Store(output) if self.outputs[output] == node)
     }
 
-    /// Values of earlier pieces that are read once, in slots that the piece does not write to.
+    /// Values of earlier pieces that are read once, in slots that the piece does not write.
     fn read_in_place(&self, steps: &[Statement], piece: &Chunk) -> HashMap<Node, usize> {
         let mut uses: HashMap<Node, usize> = HashMap::new();
         for node in steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step)) {
@@ -208,7 +208,7 @@ impl Writer<'_> {
         piece.loads.iter().copied().filter(once).collect()
     }
 
-    /// What a piece reads: variables, seeds, and values of the pieces before it.
+    /// Writes the loads of a piece: variables, seeds, and values of earlier pieces.
     fn write_loads(&self, text: &mut String, steps: &[Statement], piece: &Chunk) {
         let read = steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step));
         let (mut variables, mut seeds) = (BTreeSet::new(), BTreeSet::new());
@@ -235,7 +235,7 @@ impl Writer<'_> {
         }
     }
 
-    /// One statement.
+    /// Writes one statement.
     fn write_step(&self, text: &mut String, step: Statement) {
         match step {
             Statement::Compute(node) => {
@@ -263,7 +263,7 @@ impl Writer<'_> {
         let _ = writeln!(text, "S::store({value}, &mut {array}[{index}]);");
     }
 
-    /// The same function of several arguments.
+    /// Writes a call of a function with several arguments in lanes.
     fn write_simultaneous_call(&self, text: &mut String, values: [Option<Values>; 4]) {
         let values: Vec<_> = values.into_iter().flatten().collect();
         let function = values.first().and_then(|&values| simultaneous::function_of(self.graph, values));
@@ -289,7 +289,7 @@ impl Writer<'_> {
         );
     }
 
-    /// Values that later pieces read.
+    /// Writes the values that later pieces read.
     fn write_spills(&self, text: &mut String, step: Statement, piece: &Chunk) {
         for node in chunk::computed(step) {
             let Some(slot) = piece.spills.get(&node) else { continue };
@@ -319,7 +319,7 @@ impl Writer<'_> {
         String::from("t")
     }
 
-    /// A node where it is used: a local variable or a constant.
+    /// A node as an operand: a local variable or a constant.
     fn operand_text(&self, node: Node) -> String {
         if let Some(slot) = self.in_place.get(&node) {
             return format!("w[{slot}]");
@@ -333,14 +333,14 @@ impl Writer<'_> {
         }
     }
 
-    /// A constant by which a quotient is a product, and its reciprocal.
+    /// A constant divisor whose quotients are products, and its reciprocal.
     fn reciprocal_text(&self, node: Node) -> Option<[String; 3]> {
         let Op::Constant(bits) = self.graph.op(node) else { return None };
         let c = f64::from_bits(bits);
         divisor::reciprocal(c).map(|[high, low]| [c, high, low].map(number_text))
     }
 
-    /// A node where it is computed.
+    /// The expression that computes a node.
     fn expression_text(&self, node: Node) -> String {
         let atom = |node: Node| self.operand_text(node);
         match self.graph.op(node) {

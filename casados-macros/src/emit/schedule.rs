@@ -1,5 +1,5 @@
-//! The order in which a function computes: depth first from its outputs, so that values are used
-//! soon after they are there and a compiler can keep them in registers.
+//! The order of statements: depth first from the outputs, so that values are used soon after they
+//! are computed, and stay in registers.
 
 use crate::graph::{Graph, Node, Op, Unary};
 use std::collections::HashMap;
@@ -11,17 +11,16 @@ pub enum Statement {
     Compute(Node),
     /// Compute the sine and the cosine of the same argument.
     SinCos(Node, Node),
-    /// Compute the same elementary function of two or four arguments that do not depend on it.
+    /// Compute the same elementary function of two or four independent arguments.
     Together([Option<Values>; 4]),
     /// Store an output, by its index in the list of outputs.
     Store(usize),
 }
 
-/// The values of an elementary function of one argument: of most one node, of sine and cosine
-/// together two.
+/// The nodes of the values of an elementary function: one for most, two for sine and cosine.
 pub type Values = (Node, Option<Node>);
 
-/// Whether a node is there before anything is computed.
+/// Whether a node needs no computation.
 pub fn is_leaf(op: Op) -> bool {
     op.operands().next().is_none()
 }
@@ -33,7 +32,8 @@ pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Statement> {
     };
     let op = |index: usize| graph.op(Node(index as u32));
 
-    // Registers that a subtree needs (Sethi and Ullman): the hungrier operand comes first.
+    // The number of registers that a subtree needs (Sethi and Ullman): the operand with more
+    // registers comes first.
     let mut registers = vec![0u32; last + 1];
     let mut pairs: HashMap<Node, (Option<Node>, Option<Node>)> = HashMap::new();
     for index in graph.reachable(outputs).into_iter().map(Node::at) {
@@ -98,7 +98,8 @@ pub mod tests {
         steps
     }
 
-    /// Every operand is computed before its use, every value once, every output stored once.
+    /// Checks that every operand is computed before its use, every value once, and every output
+    /// stored once.
     pub fn assert_complete(graph: &Graph, outputs: &[Node], steps: &[Statement]) {
         let mut computed = std::collections::HashSet::new();
         let mut stored = vec![false; outputs.len()];
@@ -125,7 +126,7 @@ pub mod tests {
             check(&g, &[product]),
             [Statement::SinCos(s, c), Statement::Compute(product), Statement::Store(0)]
         );
-        // The cosine alone is not accompanied by a sine that nobody asked for.
+        // A cosine without a needed sine is computed alone.
         assert_eq!(check(&g, &[c]), [Statement::Compute(c), Statement::Store(0)]);
     }
 

@@ -1,22 +1,21 @@
-//! Elementary functions together: two arguments at once take hardly longer than one in registers
-//! that have room for both, and of four the processor works on some while others wait for
-//! themselves.
+//! Groups elementary functions: two arguments in a wider register take hardly longer than one, and
+//! of four interleaved ones the processor works on some while others wait for their own results.
 
 use super::chunk::computed;
 use super::schedule::{Statement, Values};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
-/// So many statements a function may come earlier than it would, to be computed with another: what
-/// waits for its use in the meantime takes registers.
+/// Maximum number of statements by which a function is moved forward to a group: its result
+/// occupies a register until its use.
 const MAX_LOOKAHEAD: usize = 500;
 
-/// An elementary function that is worth being computed with others.
+/// An elementary function that is worth grouping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Function {
-    /// Of one argument.
+    /// A function of one argument.
     Unary(Unary),
-    /// Of two arguments.
+    /// A function of two arguments.
     Binary(Binary),
     /// Sine and cosine.
     SinCos,
@@ -43,15 +42,15 @@ fn function(graph: &Graph, step: Statement) -> Option<(Function, Values)> {
     }
 }
 
-/// The function that has these values.
+/// The function with these values.
 pub fn function_of(graph: &Graph, (node, other): Values) -> Option<Function> {
     let step = other.map_or(Statement::Compute(node), |cos| Statement::SinCos(node, cos));
     function(graph, step).map(|(function, _)| function)
 }
 
-/// The same statements, elementary functions with the next one or the next three of their kind and
-/// level: what these wait for comes before all. The level of a value is the most elementary
-/// functions that are one within the other in it, so that none of a level waits for another.
+/// Groups each elementary function with the next one or three of its kind and level, preceded by
+/// the statements that these depend on. The level of a value is its maximum nesting depth of
+/// elementary functions, so that functions of one level are independent.
 pub fn group_simultaneous_calls(graph: &Graph, steps: &[Statement]) -> Vec<Statement> {
     let mut position = HashMap::new();
     let mut levels = vec![0u32; steps.len()];
@@ -86,7 +85,7 @@ pub fn group_simultaneous_calls(graph: &Graph, steps: &[Statement]) -> Vec<State
             list.push(step);
             continue;
         }
-        // What the others wait for.
+        // The statements that the others depend on.
         let mut first = BTreeSet::new();
         let mut stack = partners.clone();
         while let Some(at) = stack.pop() {
@@ -107,7 +106,7 @@ pub fn group_simultaneous_calls(graph: &Graph, steps: &[Statement]) -> Vec<State
     list
 }
 
-/// What a statement that computes something reads.
+/// The operands of a computing statement.
 fn operands(graph: &Graph, step: Statement) -> impl Iterator<Item = Node> {
     computed(step).take(1).flat_map(|node| graph.op(node).operands())
 }
@@ -143,7 +142,7 @@ mod tests {
         let inner = scaled.map(|a| g.unary(Unary::Exp, a));
         let outer = inner.map(|a| g.unary(Unary::Exp, a));
         let steps = check(&g, &outer);
-        // The third has no other one left.
+        // The third is left over.
         assert!(steps.contains(&paired_step((inner[0], None), (inner[1], None))), "{steps:?}");
         assert!(steps.contains(&paired_step((outer[0], None), (outer[1], None))), "{steps:?}");
         assert_eq!(
@@ -151,7 +150,7 @@ mod tests {
             2,
             "{steps:?}"
         );
-        // A function of a function of the same kind waits for it.
+        // A function of a function of the same kind depends on it.
         assert!(!check(&g, &[outer[0]]).iter().any(|step| matches!(step, Statement::Together(_))));
 
         let (s, c) = (x.map(|x| g.unary(Unary::Sin, x)), x.map(|x| g.unary(Unary::Cos, x)));
@@ -181,7 +180,7 @@ mod tests {
             nodes = nodes.map(|node| g.unary(Unary::Atan, node));
         }
         let sum = g.binary(Binary::Add, nodes[0], nodes[1]);
-        // Depth first the second chain begins where the first one ends, out of reach.
+        // In depth-first order the second chain starts at the end of the first one, out of reach.
         assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Statement::Together(_))));
     }
 }

@@ -1,4 +1,4 @@
-//! What is known about a model before it runs, as the constant `Dae::STRUCTURE`.
+//! The structure of a model as the constant `Dae::STRUCTURE`.
 
 use super::elimination;
 use crate::graph::Node;
@@ -66,7 +66,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     }}
 }
 
-/// What was differentiated.
+/// The index reduction of the model.
 fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
     let Some(Reduction { differentiated, rates, singular, projection, .. }) = reduction else {
         return quote!(::core::option::Option::None);

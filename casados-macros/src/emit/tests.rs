@@ -12,7 +12,7 @@ fn names(name: &str, length: usize) -> Vec<String> {
     (0..length).map(|index| format!("{name}[{index}]")).collect()
 }
 
-/// Dimensions are those of `x`, `z`, `u`, `p`.
+/// A model; the dimensions are those of `x`, `z`, `u`, `p`.
 fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<Node>) -> Model {
     Model {
         name: syn::Ident::new(name, Span::call_site()),
@@ -47,7 +47,7 @@ fn expanded_text(item: TokenStream, place: Place, models: Vec<Analysis>) -> Stri
     prettyplease::unparse(&file)
 }
 
-/// Expressions of a graph, read as formulas.
+/// A graph under construction from formulas.
 struct Builder(Graph);
 
 impl Builder {
@@ -72,7 +72,7 @@ impl Builder {
     }
 }
 
-/// The pendulum on a cart, as it is evaluated from left to right.
+/// The pendulum on a cart, evaluated from left to right.
 fn pendulum() -> Model {
     let mut b = Builder(Graph::default());
     let xdot: Vec<Node> = (0..4).map(|i| b.v(i)).collect();
@@ -101,8 +101,8 @@ fn pendulum() -> Model {
     model("Pendulum", [4, 0, 1, 0], b.0, residual.to_vec())
 }
 
-/// `x' z = p max(x, 0)`, `z + t = RATE`: a selection, a constant from outside, time; implicit, no
-/// control.
+/// `x' z = p max(x, 0)`, `z + t = RATE`: a selection, a constant from outside, time; implicit,
+/// without controls.
 fn valve() -> Model {
     let mut b = Builder(Graph::default());
     let [xdot, x, z, p, t] = [0, 1, 2, 3, 4].map(|i| b.v(i));

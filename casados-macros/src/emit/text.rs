@@ -2,7 +2,7 @@
 
 use crate::graph::{Binary, Unary};
 
-/// A number such that reading it gives the same bits.
+/// The text of a number that is parsed to the same bits.
 pub fn number_text(value: f64) -> String {
     if value.is_finite() {
         format!("{value:?}")

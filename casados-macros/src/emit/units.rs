@@ -1,10 +1,10 @@
-//! Units of the variables, as the constant `UNITS`, and of outputs, as `UNIT`.
+//! The units of the variables as the constant `UNITS`, and of outputs as `UNIT`.
 
 use crate::language::units::Units;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// Both constants, as far as there is something in them.
+/// Both constants, unless they are empty.
 pub fn write(krate: &syn::Path, units: &Units) -> TokenStream {
     let Units { x, z, u, p, t, .. } = units;
     let [x, z, u, p] = [x, z, u, p].map(|list| {
@@ -20,7 +20,7 @@ pub fn write(krate: &syn::Path, units: &Units) -> TokenStream {
     }
 }
 
-/// Of the outputs of a function, if there is one.
+/// The unit of the outputs of a function, if any.
 pub fn output_unit(units: &Units) -> Option<TokenStream> {
     let unit = &units.outputs;
     (!unit.is_empty()).then(|| quote!(const UNIT: &'static str = #unit;))

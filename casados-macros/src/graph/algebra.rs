@@ -1,14 +1,14 @@
 //! Arithmetic for derivative code: simplifications that save operations but may round differently,
-//! and selections kept outside of products.
+//! and selections outside of products.
 //!
 //! The derivative of `if c { √x } else { 0 }` is `if c { w / (2 √x) } else { 0 }`, never
-//! `(if c { w } else { 0 }) / (2 √x)`: at `x = 0` that would be `0 · ∞`. So what is zero in one
-//! branch stays a selection, and products go inside.
+//! `(if c { w } else { 0 }) / (2 √x)`, which is `0 · ∞` at `x = 0`. A value that is zero in one
+//! branch therefore remains a selection, and products are moved inside.
 
 use super::{Binary, Graph, Node, Op, Unary};
 
-/// Selections nest at most this deeply, so that work stays linear in their depth: more are one by
-/// all of their conditions.
+/// Maximum nesting of selections, which keeps the work linear in their depth: deeper ones become
+/// one selection with the conjunction of their conditions.
 const MAX_SELECTION_DEPTH: usize = 8;
 
 /// Sums of selections nested deeper than this are multiplied from outside.
@@ -22,7 +22,7 @@ impl Graph {
         self.value(a) == Some(0.0)
     }
 
-    /// A value that is zero outside of one branch: that branch, and the value there.
+    /// The branch outside of which a value is zero, and the value in it.
     fn branch(&self, a: Node) -> Option<(Branch, Node)> {
         match self.op(a) {
             Op::Select(condition, x, y) if self.is_zero(y) => Some(((condition, true), x)),
@@ -31,7 +31,7 @@ impl Graph {
         }
     }
 
-    /// Takes a value out of the branches outside of which it is zero.
+    /// Removes the selections outside of which a value is zero; appends their branches.
     fn strip_branches(&self, mut a: Node, branches: &mut Vec<Branch>) -> Node {
         for _ in 0..MAX_SELECTION_DEPTH {
             let Some((branch, inner)) = self.branch(a) else { break };
@@ -41,7 +41,7 @@ impl Graph {
         a
     }
 
-    /// Puts a value into branches.
+    /// Wraps a value into selections of branches.
     fn apply_branches(&mut self, mut a: Node, mut branches: Vec<Branch>) -> Node {
         let zero = self.constant(0.0);
         let mut left = Vec::new();
@@ -53,7 +53,7 @@ impl Graph {
                 left.push((condition, taken));
             }
         }
-        // No selection may be deeper than `peel` reaches: many become one.
+        // Selections are at most as deep as `strip_branches` reaches: more become one.
         if left.len() > MAX_SELECTION_DEPTH {
             let mut all = None;
             for (condition, taken) in left {
@@ -103,7 +103,7 @@ impl Graph {
         self.binary(Binary::Add, a, b)
     }
 
-    /// `a` as a multiple `(x, c)` of something else: `a = c x`.
+    /// `a` as a multiple `(x, c)` of another node: `a = c x`.
     fn multiple(&self, a: Node) -> (Node, f64) {
         match self.op(a) {
             Op::Unary(Unary::Neg, x) => (x, -1.0),
@@ -122,7 +122,7 @@ impl Graph {
         self.simplified_add(a, b)
     }
 
-    /// Whether a value is a sum of selections that are zero in some branch.
+    /// Whether a value is a sum of selections that are zero in one branch.
     fn is_sum_of_selections(&self, a: Node, depth: usize) -> bool {
         self.branch(a).is_some()
             || match self.op(a) {
@@ -170,7 +170,7 @@ impl Graph {
         self.binary(Binary::Mul, a, b)
     }
 
-    /// A constant times a node, with constant factors of the node taken together.
+    /// A constant times a node, combined with constant factors of the node.
     fn scale_by_constant(&mut self, factor: f64, a: Node) -> Node {
         if let Op::Binary(function @ (Binary::Mul | Binary::Div), x, y) = self.op(a) {
             if let Some(value) = self.value(x) {

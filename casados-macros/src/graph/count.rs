@@ -1,9 +1,9 @@
-//! What a set of outputs needs, and what it costs.
+//! The nodes and operations that outputs require.
 
 use super::{Graph, Node, Op};
 
 impl Graph {
-    /// The nodes that outputs are computed from, themselves included, operands first.
+    /// The nodes on which outputs depend, themselves included, operands first.
     pub fn reachable(&self, outputs: &[Node]) -> Vec<Node> {
         let Some(&last) = outputs.iter().max() else { return Vec::new() };
         let mut needed = vec![false; last.at() + 1];
@@ -23,7 +23,7 @@ impl Graph {
         nodes
     }
 
-    /// The number of operations that outputs take together; an elementary function is one.
+    /// The number of operations for all outputs; an elementary function counts as one.
     pub fn operation_count(&self, outputs: &[Node]) -> u32 {
         let leaf = |node: &&Node| {
             matches!(self.op(**node), Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_))

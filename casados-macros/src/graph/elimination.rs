@@ -1,8 +1,8 @@
-//! Elimination of the intermediate vertices of a linearised graph, symbolically.
+//! Symbolic elimination of the intermediate vertices of a linearised graph.
 //!
 //! Edges `p → s` carry `∂s/∂p`. Eliminating a vertex `v` replaces every path `p → v → s` by an
-//! edge: `∂s/∂p += ∂s/∂v · ∂v/∂p`. What remains between variables and outputs is the Jacobian
-//! (Griewank and Walther, "Evaluating Derivatives", chapter 10).
+//! edge: `∂s/∂p += ∂s/∂v · ∂v/∂p`. The remaining edges between variables and outputs are the
+//! Jacobian (Griewank and Walther, "Evaluating Derivatives", chapter 10).
 //!
 //! For second derivatives there are also arcs `{v, n}`, the entries of a symmetric matrix `W` of
 //! second derivatives with respect to vertices; eliminating `v` pushes them to the operands of `v`:
@@ -20,16 +20,16 @@ pub enum Order {
     Reverse,
     /// From the variables to the outputs.
     Forward,
-    /// The fewest products first; of equals, the one nearer to the outputs.
+    /// The fewest products first; among equals, the one nearest to the outputs.
     Markowitz,
 }
 
 /// A linearised graph. Vertices are in topological order: variables, intermediates, outputs.
 #[derive(Clone, Debug, Default)]
 pub struct Linearised {
-    /// Into each vertex: from where, and the derivative.
+    /// The edges into each vertex: source and derivative.
     pub into: Vec<BTreeMap<u32, Node>>,
-    /// Out of each vertex: to where.
+    /// The edges out of each vertex: target.
     pub out: Vec<BTreeSet<u32>>,
     /// Second derivatives; each is stored at both ends.
     pub arcs: Vec<BTreeMap<u32, Node>>,
@@ -54,7 +54,7 @@ impl Linearised {
         }
     }
 
-    /// `W_jk += value`, and `W_kj`
+    /// Adds to `W_jk` and `W_kj`.
     pub fn add_arc(&mut self, graph: &mut Graph, j: u32, k: u32, value: Node) {
         add(graph, &mut self.arcs[j as usize], k, value);
         if j != k {
@@ -65,8 +65,8 @@ impl Linearised {
         }
     }
 
-    /// Eliminates the intermediate vertices. Gives up, and returns `None`, when it takes more than
-    /// `budget` products; otherwise returns their number.
+    /// Eliminates the intermediate vertices; returns the number of products, or `None` if it
+    /// exceeds `budget`.
     pub fn eliminate(
         &mut self,
         graph: &mut Graph,
@@ -91,7 +91,7 @@ impl Linearised {
                     if !left[v as usize] {
                         continue;
                     }
-                    // The cost may have changed since.
+                    // The cost may have changed.
                     let now = key(self, v);
                     if entry != now {
                         heap.push(now);
@@ -108,7 +108,7 @@ impl Linearised {
         Some(products)
     }
 
-    /// The products that eliminating a vertex takes.
+    /// The number of products for the elimination of a vertex.
     fn product_count(&self, v: u32) -> usize {
         let v = v as usize;
         let (into, out, arcs) = (self.into[v].len(), self.out[v].len(), self.arcs[v].len());
@@ -158,7 +158,7 @@ impl Linearised {
     }
 }
 
-/// Adds to an entry. Says whether it is there afterwards: zeros are not kept.
+/// Adds to an entry; returns whether it is non-zero. Zeros are removed.
 fn add(graph: &mut Graph, entries: &mut BTreeMap<u32, Node>, key: u32, value: Node) -> bool {
     let sum = match entries.get(&key) {
         Some(&old) => graph.simplified_add(old, value),

@@ -1,8 +1,8 @@
-//! The interpreter: values of nodes in `f64`.
+//! Evaluation of nodes in `f64`.
 
 use super::{Binary, Compare, Graph, Node, Op, Unary};
 
-/// Values of everything that a graph depends on. What is missing is NaN.
+/// The values of variables, constants and seeds. Missing ones are NaN.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EvaluationPoint<'a> {
     /// `(ẋ, x, z, u, p, t)`
@@ -14,7 +14,7 @@ pub struct EvaluationPoint<'a> {
 }
 
 impl Graph {
-    /// Values of nodes at a point. Conditions are 1 or 0.
+    /// The values of nodes at a point. Conditions are 1 or 0.
     pub fn evaluate(&self, nodes: &[Node], point: EvaluationPoint) -> Vec<f64> {
         let given = |values: &[f64], index: u32| values.get(index as usize).copied().unwrap_or(f64::NAN);
         let truth = |truth: bool| f64::from(u8::from(truth));

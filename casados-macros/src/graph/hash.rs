@@ -1,11 +1,11 @@
-//! The hash of the graph's index: keys are small and come from nobody hostile.
+//! The hash of the graph's index, for small and trusted keys.
 
 use std::hash::{BuildHasherDefault, Hasher};
 
 pub type BuildHasher = BuildHasherDefault<Multiply>;
 
-/// Multiplies word by word and folds the upper half of the product onto the lower: constants such
-/// as small integers differ in their upper bits only.
+/// Multiplies word by word and folds the upper half of the product onto the lower one: constants
+/// such as small integers differ in their upper bits only.
 #[derive(Clone, Default)]
 pub struct Multiply(u64);
 

@@ -6,16 +6,15 @@ use super::reverse::adjoints;
 use super::{Entry, Graph, Node};
 
 /// The structural non-zeros `(j, k, value)`, `j ≥ k`, of the Hessian of `Σ seed · output` with
-/// respect to the variables `0..variables`, by row, then column. Of two elimination orders the one
-/// with fewer operations.
+/// respect to the variables `0..variables`, by row, then column. The cheaper of two elimination
+/// orders.
 pub fn hessian(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<Entry> {
     cheapest_order(graph, &[Order::Reverse, Order::Markowitz], &[], |graph, order, budget| {
         hessian_in_order(graph, outputs, variables, order, budget)
     })
 }
 
-/// The Hessian by one elimination order, and the products it took; `None` if they are more than
-/// `budget`.
+/// The Hessian by one elimination order, and its number of products; `None` if it exceeds `budget`.
 ///
 /// Second derivatives arise at the operands of nonlinear nodes, weighted with the adjoints of these
 /// nodes, and are pushed from there to the variables.
@@ -35,7 +34,7 @@ pub fn hessian_in_order(
             arcs.extend(graph.second_partials(node, adjoint, is_active));
         }
     }
-    // Only vertices below an arc matter.
+    // Only vertices below an arc are needed.
     let mut needed = vec![false; active.len()];
     for &(j, k, _) in &arcs {
         needed[j.at()] = true;

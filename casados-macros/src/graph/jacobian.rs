@@ -4,8 +4,8 @@ use super::elimination::{Linearised, Order};
 use super::{Entry, Graph, Node, Op};
 
 /// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to
-/// the variables `0..variables`, by output, then variable. Of several elimination orders the one
-/// with the fewest operations for outputs and Jacobian together.
+/// the variables `0..variables`, by output, then variable. The elimination order with the fewest
+/// operations for outputs and Jacobian.
 pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<Entry> {
     cheapest_order(
         graph,
@@ -15,7 +15,7 @@ pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<Entr
     )
 }
 
-/// Tries elimination orders on copies of the graph and keeps the one with the fewest operations.
+/// Tries elimination orders on copies of the graph; returns the one with the fewest operations.
 pub fn cheapest_order(
     graph: &mut Graph,
     orders: &[Order],
@@ -27,7 +27,7 @@ pub fn cheapest_order(
     for &order in orders {
         let mut copy = graph.clone();
         let Some((entries, products)) = derive(&mut copy, order, budget) else { continue };
-        // No order is worth many times the work of another.
+        // An order may take at most about twice the products of the best one.
         budget = budget.min(products.saturating_mul(2).saturating_add(1000));
         let entries = copy.with_folded_signs(entries, beside);
         let needed: Vec<Node> = beside.iter().copied().chain(entries.iter().map(|entry| entry.2)).collect();
@@ -41,7 +41,7 @@ pub fn cheapest_order(
     entries
 }
 
-/// The Jacobian by one elimination order, and the products it took; `None` if they are more than
+/// The Jacobian by one elimination order, and its number of products; `None` if it exceeds
 /// `budget`.
 pub fn jacobian_in_order(
     graph: &mut Graph,
@@ -73,15 +73,16 @@ pub fn jacobian_in_order(
     Some((entries.collect(), products))
 }
 
-/// Numbers of vertices: variables keep theirs, intermediate nodes follow in topological order.
+/// The numbering of vertices: variables keep their indices, intermediate nodes follow in
+/// topological order.
 pub struct VertexNumbering {
     of: Vec<u32>,
-    /// How many there are.
+    /// The number of vertices.
     pub count: u32,
 }
 
 impl VertexNumbering {
-    /// Numbers the variables and some nodes.
+    /// Numbers the variables and the given nodes.
     pub fn new(graph: &Graph, nodes: &[Node], variables: u32, len: usize) -> Self {
         let mut of = vec![u32::MAX; len];
         let mut count = variables;

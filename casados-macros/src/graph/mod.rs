@@ -1,12 +1,12 @@
 //! A hash-consed expression graph: equal expressions are one node.
 //!
-//! Nodes are created in topological order: the operands of a node have smaller indices than the
-//! node. Constructors simplify in ways that keep the bits of the result, the sign of a zero apart
-//! (constant folding, `a + 0`, `a · 1`, `−(−a)`), and take structural zeros as zeros (`0 · a = 0`,
-//! `a − a = 0`, whatever `a` is at run time). Derivative code is written with the operations of
-//! `algebra`, which may also round differently.
+//! Nodes are in topological order: operands have smaller indices. Constructors apply
+//! simplifications that preserve the bits of the result, except for the sign of a zero (constant
+//! folding, `a + 0`, `a · 1`, `−(−a)`), and structural zeros (`0 · a = 0`, `a − a = 0`, for every
+//! value of `a`). Derivative code uses the operations of `algebra`, which may also round
+//! differently.
 //!
-//! Nothing here recurses along the graph: it may be deeper than a stack.
+//! Functions do not recurse along the graph, which may be deeper than the stack.
 
 mod algebra;
 mod count;
@@ -45,14 +45,14 @@ pub struct Node(pub u32);
 /// An entry of a sparse matrix: row, column, value.
 pub type Entry = (u32, u32, Node);
 
-/// What a node computes.
+/// The operation of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Op {
-    /// A number, by its bits.
+    /// A constant, by its bits.
     Constant(u64),
     /// A variable of the model, by its index in `(ẋ, x, z, u, p, t)`.
     Variable(u32),
-    /// A constant that is defined outside of what the macro sees, by its index in the model's list.
+    /// A constant defined outside of the macro's input, by its index in the model's list.
     Opaque(u32),
     /// An adjoint seed `μ_r`.
     Seed(u32),
@@ -66,15 +66,15 @@ pub enum Op {
     Select(Node, Node, Node),
     /// A condition: `a < b`, `a ≤ b` or `a = b`.
     Compare(Compare, Node, Node),
-    /// A condition: both.
+    /// A conjunction of conditions.
     And(Node, Node),
-    /// A condition: one or both.
+    /// A disjunction of conditions.
     Or(Node, Node),
-    /// A condition: not.
+    /// A negated condition.
     Not(Node),
 }
 
-/// Functions of one argument. Names as the methods of `f64`.
+/// Functions of one argument, named as the methods of `f64`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum Unary {
@@ -106,7 +106,7 @@ pub enum Unary {
     Table(Table<1>),
 }
 
-/// Functions of two arguments. Names as the operators and methods of `f64`.
+/// Functions of two arguments, named as the operators and methods of `f64`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum Binary {
@@ -131,7 +131,7 @@ pub enum Compare {
 }
 
 impl Op {
-    /// The nodes that it is computed from.
+    /// The operands.
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let operands = match self {
             Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_) => [None; 3],
@@ -146,13 +146,13 @@ impl Op {
 }
 
 impl Node {
-    /// As an index of an array with one element per node.
+    /// The index into an array with one element per node.
     pub fn at(self) -> usize {
         self.0 as usize
     }
 }
 
-/// The graph.
+/// The expression graph.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     ops: Vec<Op>,
@@ -160,7 +160,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// What a node computes.
+    /// The operation of a node.
     pub fn op(&self, node: Node) -> Op {
         self.ops[node.at()]
     }
@@ -170,7 +170,7 @@ impl Graph {
         self.ops.len()
     }
 
-    /// The node of an operation: the one there is, or a new one.
+    /// The node of an operation: an existing or a new one.
     fn node(&mut self, op: Op) -> Node {
         if let Some(&node) = self.index.get(&op) {
             return node;
@@ -181,12 +181,12 @@ impl Graph {
         node
     }
 
-    /// A number.
+    /// A constant.
     pub fn constant(&mut self, value: f64) -> Node {
         self.node(Op::Constant(value.to_bits()))
     }
 
-    /// The number that a node is, if it is one.
+    /// The value of a node, if it is a constant.
     pub fn value(&self, node: Node) -> Option<f64> {
         match self.op(node) {
             Op::Constant(bits) => Some(f64::from_bits(bits)),

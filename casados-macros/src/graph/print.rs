@@ -1,10 +1,10 @@
-//! A graph as text: one node a line, operands first.
+//! A graph as text: one node in each line, operands first.
 
 use super::{Graph, Node, Op};
 use std::fmt::Write;
 
 impl Graph {
-    /// What outputs are computed from; `#7` is node 7.
+    /// The nodes on which outputs depend; `#7` is node 7.
     pub fn print(&self, outputs: &[Node]) -> String {
         let mut text = String::new();
         for node in self.reachable(outputs) {

@@ -39,8 +39,8 @@ pub fn adjoints(graph: &mut Graph, outputs: &[(Node, Node)], active: &[bool]) ->
 }
 
 impl Graph {
-    /// For every node up to the last output whether it is differentiable and not constant with
-    /// respect to the variables `0..variables`.
+    /// For every node up to the last output, whether it depends on the variables `0..variables`
+    /// differentiably.
     pub(super) fn active_nodes(&self, outputs: impl Iterator<Item = Node>, variables: u32) -> Vec<bool> {
         let len = outputs.map(|output| output.at() + 1).max().unwrap_or(0);
         let mut active = vec![false; len];

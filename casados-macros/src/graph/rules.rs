@@ -3,12 +3,12 @@
 use super::{Binary, Graph, Node, Op, Unary, tangent};
 use std::f64::consts::{LN_2, LOG2_E, LOG10_E};
 
-/// Operands and what belongs to each; an operand occurs once.
+/// The operands of a node with a term each; every operand occurs once.
 pub type OperandTerms = [Option<(Node, Node)>; 2];
 
 impl Graph {
-    /// `∂c/∂a` of a function `c` of one argument `a`, in forms that neither cancel nor overflow
-    /// where that is cheap.
+    /// `∂c/∂a` of a function `c` of one argument `a`, in forms without cancellation and overflow
+    /// where these are cheap.
     fn unary_partial(&mut self, function: Unary, a: Node, c: Node) -> Node {
         let one = self.constant(1.0);
         match function {
@@ -26,7 +26,7 @@ impl Graph {
                 let ln2 = self.constant(LN_2);
                 self.simplified_mul(ln2, c)
             }
-            // c + 1 would lose everything where a is very negative.
+            // c + 1 would cancel for very negative a.
             Unary::ExpM1 => self.unary(Unary::Exp, a),
             Unary::Ln => self.simplified_div(one, a),
             Unary::Ln1p => {
@@ -69,7 +69,7 @@ impl Graph {
                 let square = self.simplified_mul(c, c);
                 self.simplified_sub(one, square)
             }
-            // Where a² overflows this is zero, which is what it rounds to beside anything else.
+            // If a² overflows this is zero, which is negligible beside any other number.
             Unary::Asinh => {
                 let square = self.simplified_mul(a, a);
                 let sum = self.simplified_add(one, square);
@@ -92,7 +92,7 @@ impl Graph {
         }
     }
 
-    /// `1 − a²` as `(1 − a)(1 + a)`, which does not cancel near `|a| = 1`, and its square root.
+    /// `1 − a²` as `(1 − a)(1 + a)`, without cancellation near `|a| = 1`, and its square root.
     fn one_minus_square(&mut self, a: Node) -> (Node, Node) {
         let one = self.constant(1.0);
         let (below, above) = (self.simplified_sub(one, a), self.simplified_add(one, a));
@@ -147,14 +147,14 @@ impl Graph {
         }
     }
 
-    /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division instead of another power, which costs ten
-    /// times as much. Not a number at `a = 0`, where the limit is zero or infinite.
+    /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division, which costs a tenth of another power. NaN
+    /// at `a = 0`, where the limit is zero or infinite.
     fn power_ratio(&mut self, n: f64, a: Node, c: Node) -> Node {
         let (n, ratio) = (self.constant(n), self.simplified_div(c, a));
         self.simplified_mul(n, ratio)
     }
 
-    /// Zero at `a = 0`, if that is the limit.
+    /// Zero at `a = 0`, if that is the limit; otherwise the value.
     fn zero_at_zero(&mut self, zero_is_limit: bool, a: Node, value: Node) -> Node {
         if !zero_is_limit {
             return value;
@@ -210,7 +210,7 @@ impl Graph {
     }
 
     /// `w` times the second partial derivatives of a node with respect to the operands that satisfy
-    /// a predicate: `(j, k, value)`, pairs of different operands once.
+    /// a predicate: `(j, k, value)`, each pair of operands once.
     pub(super) fn second_partials(
         &mut self,
         node: Node,
@@ -273,8 +273,8 @@ impl Graph {
         self.zero_at_zero(n > 2.0, a, second)
     }
 
-    /// The rules applied to the partial derivatives, on a graph of their own in which the operands
-    /// are variables: what operands are made of must not be differentiated.
+    /// Applies the rules to the partial derivatives, on a separate graph whose variables are the
+    /// operands, so that the operands are not differentiated.
     fn second_by_rules(&mut self, op: Op, w: Node, active: impl Fn(Node) -> bool) -> Vec<(Node, Node, Node)> {
         let operands: Vec<Node> = op.operands().collect();
         let mut scratch = Graph::default();
@@ -323,7 +323,7 @@ impl Graph {
         arcs
     }
 
-    /// An expression of another graph, with other nodes for its variables.
+    /// Copies an expression of another graph, with `variables` as its variables.
     fn copy_from_graph(&mut self, from: &Graph, node: Node, variables: &[Node]) -> Node {
         let mut image = vec![node; node.at() + 1];
         for node in from.reachable(&[node]) {
@@ -336,7 +336,7 @@ impl Graph {
     }
 }
 
-/// Exponents that are better served by multiplications.
+/// Whether multiplications are cheaper than a power with this exponent.
 fn is_small_integer(n: f64) -> bool {
     n == n.trunc() && n.abs() <= 64.0
 }

@@ -1,14 +1,14 @@
-//! Signs that cost nothing: `−(x (2 y))` is `x (−2 y)`, whose factor other entries share. Rounding
-//! does not depend on signs, so no bit but that of a zero changes.
+//! Moves negations into constants: `−(x (2 y))` becomes `x (−2 y)`, whose factor other entries may
+//! share. Rounding does not depend on signs, so that only the sign of a zero changes.
 
 use super::{Binary, Entry, Graph, Node, Op, Unary};
 
-/// How deep a sign goes: work stays linear.
+/// Maximum depth to which a sign is moved, which keeps the work linear.
 const MAX_SIGN_DEPTH: usize = 4;
 
 impl Graph {
-    /// Entries in which negations went into constants, if that takes fewer operations for them and
-    /// what is computed beside them; else as they are.
+    /// Entries with negations moved into constants, if that reduces the operations of entries and
+    /// `beside`; otherwise unchanged.
     pub(super) fn with_folded_signs(&mut self, entries: Vec<Entry>, beside: &[Node]) -> Vec<Entry> {
         let signed: Vec<Entry> = entries
             .iter()
@@ -27,7 +27,7 @@ impl Graph {
         if operations(&signed) < operations(&entries) { signed } else { entries }
     }
 
-    /// `−a` without an operation more than `a` takes.
+    /// `−a` without an additional operation.
     fn negate_without_cost(&mut self, a: Node, depth: usize) -> Option<Node> {
         let depth = depth.checked_sub(1)?;
         match self.op(a) {
@@ -78,7 +78,7 @@ mod tests {
         let point = EvaluationPoint { variables: &at, ..Default::default() };
         assert_eq!(g.evaluate(&before, point), g.evaluate(&after, point));
 
-        // Nothing to hide a sign in.
+        // No constant to absorb the sign.
         let negative = g.unary(Unary::Neg, other);
         assert_eq!(g.with_folded_signs(vec![(0, 0, negative)], &[]), [(0, 0, negative)]);
     }

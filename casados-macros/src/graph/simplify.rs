@@ -1,4 +1,5 @@
-//! Constructors of expressions. They keep the bits of the result, the sign of a zero apart.
+//! Constructors of expressions. They preserve the bits of the result, except for the sign of a
+//! zero.
 
 use super::evaluate::{binary_value, compare_value, unary_value};
 use super::{Binary, Compare, Graph, Node, Op, Unary};
@@ -54,7 +55,7 @@ impl Graph {
         }
     }
 
-    /// The operand of a negation.
+    /// The operand, if the node is a negation.
     fn operand_of_negation(&self, a: Node) -> Option<Node> {
         match self.op(a) {
             Op::Unary(Unary::Neg, inner) => Some(inner),
@@ -193,7 +194,7 @@ impl Graph {
         }
     }
 
-    /// A comparison of numbers. Of two constants it is folded: see [`Graph::truth`].
+    /// A comparison of numbers. Of two constants it is folded: see [`Graph::known_condition`].
     pub fn compare(&mut self, comparison: Compare, a: Node, b: Node) -> Node {
         match (self.value(a), self.value(b)) {
             (Some(a), Some(b)) => self.constant_condition(compare_value(comparison, a, b)),
@@ -203,7 +204,7 @@ impl Graph {
         }
     }
 
-    /// Both conditions.
+    /// A conjunction.
     pub fn and(&mut self, a: Node, b: Node) -> Node {
         match (self.known_condition(a), self.known_condition(b)) {
             (Some(false), _) | (_, Some(true)) => a,
@@ -213,7 +214,7 @@ impl Graph {
         }
     }
 
-    /// One condition or both.
+    /// A disjunction.
     pub fn or(&mut self, a: Node, b: Node) -> Node {
         match (self.known_condition(a), self.known_condition(b)) {
             (Some(true), _) | (_, Some(false)) => a,
@@ -223,7 +224,7 @@ impl Graph {
         }
     }
 
-    /// Not the condition.
+    /// A negation.
     pub fn not(&mut self, a: Node) -> Node {
         match (self.known_condition(a), self.op(a)) {
             (Some(truth), _) => self.constant_condition(!truth),
@@ -232,13 +233,13 @@ impl Graph {
         }
     }
 
-    /// A condition that always has the same value is `0 = 0` or `0 < 0`.
+    /// A constant condition: `0 = 0` or `0 < 0`.
     fn constant_condition(&mut self, truth: bool) -> Node {
         let zero = self.constant(0.0);
         self.node(Op::Compare(if truth { Compare::Eq } else { Compare::Lt }, zero, zero))
     }
 
-    /// The value of a condition, if it is known.
+    /// The value of a constant condition.
     pub fn known_condition(&self, condition: Node) -> Option<bool> {
         match self.op(condition) {
             Op::Compare(comparison, a, b) => Some(compare_value(comparison, self.value(a)?, self.value(b)?)),
@@ -247,8 +248,8 @@ impl Graph {
     }
 }
 
-/// `1 / a`, if division by `a` and multiplication by it are the same: `a` is a power of two, and
-/// neither is subnormal.
+/// `1 / a`, if division by `a` and multiplication by it are equivalent: `a` is a power of two, and
+/// neither number is subnormal.
 fn exact_reciprocal(a: f64) -> Option<f64> {
     const MANTISSA: u64 = (1 << 52) - 1;
     let reciprocal = 1.0 / a;

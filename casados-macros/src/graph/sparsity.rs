@@ -1,20 +1,20 @@
-//! What nodes depend on, and whether linearly.
+//! The dependence of nodes on variables, and its linearity.
 
 use super::{Binary, Graph, Node, Op, Unary};
 
-/// How a node depends on a set of variables.
+/// The dependence of a node on a set of variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Degree {
-    /// Not at all.
+    /// Independent of the variables.
     Constant,
-    /// As an affine function.
+    /// An affine function.
     Linear,
-    /// In any other way.
+    /// Any other function.
     Nonlinear,
 }
 
 impl Graph {
-    /// For each node the indices of the variables that it depends on, ascending.
+    /// For each node the indices of the variables on which it depends, ascending.
     pub fn dependencies(&self, nodes: &[Node]) -> Vec<Vec<u32>> {
         let reachable = self.reachable(nodes);
         let variable = |node: &Node| match self.op(*node) {
@@ -24,7 +24,7 @@ impl Graph {
         let Some(largest) = reachable.iter().filter_map(variable).max() else {
             return vec![Vec::new(); nodes.len()];
         };
-        // One row of bits per reachable node.
+        // One row of bits for each reachable node.
         let words = largest / 64 + 1;
         let mut row = vec![usize::MAX; self.len()];
         let mut bits = vec![0u64; words * reachable.len()];
@@ -46,7 +46,7 @@ impl Graph {
         nodes.iter().map(set).collect()
     }
 
-    /// For each node how it depends on the variables of a set, jointly.
+    /// For each node its joint dependence on the variables of a set.
     pub fn degrees(&self, nodes: &[Node], set: impl Fn(u32) -> bool) -> Vec<Degree> {
         use Degree::{Constant, Linear, Nonlinear};
         let mut degrees = vec![Constant; self.len()];

@@ -1,16 +1,16 @@
-//! Expressions in the place of variables.
+//! Substitution of variables by expressions.
 
 use super::{Graph, Node, Op};
 use std::collections::BTreeMap;
 
 impl Graph {
-    /// Outputs with expressions in the place of variables, all at once.
+    /// Outputs with variables replaced by expressions, simultaneously.
     pub fn substitute(&mut self, outputs: &[Node], by: &BTreeMap<u32, Node>) -> Vec<Node> {
         let nodes = self.reachable(outputs);
         let mut new: Vec<Node> = (0..nodes.last().map_or(0, |node| node.0 + 1)).map(Node).collect();
         for node in nodes {
             let op = self.op(node);
-            // What does not change keeps its node.
+            // An unchanged operation keeps its node.
             if op.operands().all(|operand| new[operand.at()] == operand) {
                 if let Op::Variable(index) = op
                     && let Some(&expression) = by.get(&index)
@@ -24,7 +24,7 @@ impl Graph {
         outputs.iter().map(|output| new[output.at()]).collect()
     }
 
-    /// An operation with other operands.
+    /// An operation with replaced operands.
     pub fn rebuild(&mut self, op: Op, at: impl Fn(Node) -> Node) -> Node {
         match op {
             Op::Constant(bits) => self.constant(f64::from_bits(bits)),

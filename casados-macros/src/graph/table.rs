@@ -1,5 +1,5 @@
-//! Tables: functions of which only the compiler knows the numbers. A derivative of a table is the
-//! table with another order.
+//! Tables: functions whose numbers only the compiler knows. A derivative of a table is the table
+//! with another order.
 
 use super::{Binary, Graph, Node, Unary};
 use std::f64::consts::FRAC_PI_2;
@@ -9,33 +9,33 @@ use std::f64::consts::FRAC_PI_2;
 pub struct Table<const K: usize> {
     /// Its index in the model's list.
     pub index: u32,
-    /// How often it is differentiated by each variable.
+    /// The order of the derivative with respect to each variable.
     pub orders: [u8; K],
-    /// Derivatives of higher order by one variable are zero.
+    /// Derivatives of higher order with respect to one variable are zero.
     pub degree: u8,
 }
 
-/// An order that stands for a number of each piece, where the first derivative jumps between them,
-/// and is zero where it does not.
+/// The order that identifies the piece if the first derivative jumps between pieces, and is zero
+/// otherwise.
 const KINKS: u8 = 254;
-/// The same where a higher derivative jumps.
+/// The order that identifies the piece if a higher derivative jumps.
 const KNOTS: u8 = 255;
 
 impl<const K: usize> Table<K> {
-    /// What changes between the pieces of a table with kinks, and of one that is smoother. Which it
-    /// is the compiler knows.
+    /// The numbers that identify the pieces of a table with kinks, and of a smoother one. Only the
+    /// compiler knows which of both the table is.
     pub fn piece_indicators(self) -> [Self; 2] {
         [KINKS, KNOTS].map(|order| Self { orders: [order; K], ..self })
     }
 
-    /// Its derivative by a variable, unless that is zero.
+    /// The derivative with respect to a variable, unless it is zero.
     fn derivative(mut self, variable: usize) -> Option<Self> {
         self.orders[variable] += 1;
         (self.orders[variable] <= self.degree).then_some(self)
     }
 
-    /// Values for sample points, in the place of numbers that are not known here: of a product of
-    /// sines, whose derivatives fit to each other.
+    /// Values at sample points, which replace the unknown numbers: those of a product of sines,
+    /// with consistent derivatives.
     pub fn sample_value(self, at: [f64; K]) -> f64 {
         let mut phase = 0.4 + f64::from(self.index);
         let mut product = 1.0;
@@ -56,7 +56,7 @@ impl Graph {
         }
     }
 
-    /// The derivative of a table of two variables by the first or the second one.
+    /// The derivative of a table of two variables with respect to the first or the second one.
     pub(super) fn table_partial(&mut self, table: Table<2>, a: Node, b: Node, first: bool) -> Node {
         match table.derivative(usize::from(!first)) {
             Some(table) => self.binary(Binary::Table(table), a, b),

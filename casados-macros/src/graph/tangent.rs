@@ -2,7 +2,7 @@
 
 use super::{Graph, Node, Op};
 
-/// The derivative of outputs where variables change at these rates; without a rate they stay.
+/// The derivative of outputs along the rates of variables; variables without a rate are constant.
 pub fn tangent(graph: &mut Graph, outputs: &[Node], rate: impl Fn(u32) -> Option<Node>) -> Vec<Node> {
     let nodes = graph.reachable(outputs);
     let mut rates: Vec<Option<Node>> = vec![None; nodes.last().map_or(0, |node| node.at() + 1)];

@@ -1,4 +1,4 @@
-//! Fields, elements and slices: expressions that name a place.
+//! Fields, elements and slices: expressions that denote a place.
 
 use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, opaque_value_error};
 use super::methods::{self, Receiver};
@@ -11,7 +11,7 @@ use std::rc::Rc;
 use syn::{Expr, Result};
 
 impl Evaluator {
-    /// The place an expression refers to, if it is one; its value otherwise.
+    /// The place that an expression denotes, otherwise its value.
     pub(super) fn place(&mut self, expression: &Expr, mutable: bool) -> Evaluated<Receiver> {
         self.place_of_type(expression, mutable, &Type::Unknown)
     }
@@ -81,7 +81,7 @@ impl Evaluator {
         }
     }
 
-    /// With mutable references followed.
+    /// Follows mutable references.
     pub(super) fn dereferenced(&mut self, receiver: Receiver, at: TokenSpan) -> Result<Receiver> {
         Ok(match receiver {
             Receiver::Place(place) => Receiver::Place(self.follow_place(place, at)?),
@@ -99,7 +99,7 @@ impl Evaluator {
             _ => Type::Integer(IntegerType::Usize),
         };
         let position = match &*index.index {
-            // Literals in a range or tuple get their type too, but it does not matter for them.
+            // Literals in a range or tuple get a type as well, which has no effect.
             Expr::Range(_) | Expr::Tuple(_) => self.expression(&index.index, &Type::Unknown)?,
             expression => self.expression(expression, &hint)?,
         };
@@ -165,7 +165,7 @@ impl Evaluator {
         }
     }
 
-    /// An integer variable that is an index is a `usize`, if nothing else has told its type.
+    /// Sets the type of an integer variable used as an index to `usize`, unless it is known.
     fn infer_usize_index(&mut self, index: &Expr) {
         let Expr::Path(path) = index else { return };
         let Some(name) = path.path.get_ident() else { return };
@@ -177,7 +177,7 @@ impl Evaluator {
         }
     }
 
-    /// First and end of a range of indices.
+    /// The start and end of a range of indices.
     pub fn range_bounds(&mut self, range: &Range, length: usize, at: TokenSpan) -> Result<(usize, usize)> {
         let start = match &range.start {
             Some(start) => self.usize(start, at)?,
@@ -191,7 +191,7 @@ impl Evaluator {
     }
 }
 
-/// The way from a value to its field.
+/// The projection from a value to its field.
 fn field_projection(value: &Value, member: &syn::Member) -> std::result::Result<Projection, ()> {
     match (value, member) {
         (Value::Tuple(_), syn::Member::Unnamed(index)) => Ok(Projection::Field(index.index as usize)),

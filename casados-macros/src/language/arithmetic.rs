@@ -6,7 +6,7 @@ use super::value::{Integer, IntegerType, Value};
 use crate::graph::{Binary, Compare, Node, Unary};
 use syn::Result;
 
-/// Binary operators that yield numbers.
+/// Binary operators that return numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Operator {
@@ -69,7 +69,7 @@ pub enum Comparison {
 }
 
 impl Evaluator {
-    /// `a ∘ b` of any two values that have it, elementwise and user-defined operators included.
+    /// `a ∘ b` for all types of values, with elementwise and user-defined operators.
     pub fn binary(&mut self, operator: Operator, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         match (a, b) {
             (Value::Real(_) | Value::Opaque(_), Value::Real(_) | Value::Opaque(_)) => {
@@ -215,7 +215,7 @@ impl Evaluator {
         })
     }
 
-    /// A comparison: a `Bool` where it is known, a `Condition` where it is not.
+    /// A comparison: a `Bool` if it is known, otherwise a `Condition`.
     pub fn compare(&mut self, comparison: Comparison, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         match (a, b) {
             (Value::Reference(place), _) => {
@@ -261,7 +261,7 @@ impl Evaluator {
                 Err(opaque_value_error(at, "an integer"))
             }
             (Value::Tuple(x), Value::Tuple(y)) | (Value::Array(x), Value::Array(y)) => {
-                // Lexicographic: the last elements decide if all before are equal.
+                // Lexicographic: later elements decide if all earlier ones are equal.
                 let mut result =
                     if x.len() == y.len() { Value::Bool(!strict) } else { Value::Bool(x.len() < y.len()) };
                 for (x, y) in x.iter().zip(y.iter()).rev() {
@@ -335,7 +335,7 @@ impl Evaluator {
     }
 }
 
-/// The integer, if it is within the range of the type.
+/// The integer, if it is in the range of its type.
 pub fn checked_integer(value: Option<i128>, ty: Option<IntegerType>) -> Option<Integer> {
     let value = value?;
     match ty {
@@ -344,7 +344,7 @@ pub fn checked_integer(value: Option<i128>, ty: Option<IntegerType>) -> Option<I
     }
 }
 
-/// The integer wrapped into the range of its type, as `as` does it.
+/// The integer wrapped into the range of its type, as by `as`.
 pub fn wrapped_integer(value: i128, ty: IntegerType) -> Integer {
     let bits = ty.bits();
     let value = if bits == 128 {
@@ -388,7 +388,7 @@ pub fn integer_operator(operator: Operator, a: Integer, b: Integer) -> std::resu
             }
         }
     };
-    // Without a type it is `i32`, unless the compiler finds another one.
+    // Without a known type it is `i32`, unless the compiler infers another one.
     let value = value.filter(|&value| ty.is_some() || i32::try_from(value).is_ok());
     checked_integer(value, ty).ok_or_else(|| {
         let name = ty.map_or("i32", IntegerType::name);

@@ -1,4 +1,4 @@
-//! Assignments: `=` also to several places at once, `+=` and its kind.
+//! Assignments: `=`, also to several places, and compound assignments.
 
 use super::arithmetic::Operator;
 use super::evaluator::{Evaluated, Evaluator, error};
@@ -21,7 +21,7 @@ impl Evaluator {
             }
             left => {
                 let place = self.assignment_target(left);
-                // The right side comes first, and may change which place this is.
+                // The right side is executed first, and may change the place.
                 let place = if is_side_effect_free(left) { place.ok() } else { Some(place?) };
                 let expected = match &place {
                     Some(place) => {
@@ -42,7 +42,7 @@ impl Evaluator {
         Ok(Value::unit())
     }
 
-    /// The place on the left of an assignment.
+    /// The place on the left side of an assignment.
     fn assignment_target(&mut self, left: &Expr) -> Evaluated<Place> {
         match self.place(left, true)? {
             Receiver::Place(place) => Ok(place),
@@ -143,7 +143,7 @@ impl Evaluator {
         {
             return Ok(Value::unit());
         }
-        // Of numbers the right side comes first, and may change which place this is.
+        // For numbers the right side is executed first, and may change the place.
         let is_number = matches!(
             before,
             Value::Real(_) | Value::Integer(_) | Value::Bool(_) | Value::Condition(_) | Value::Opaque(_)
@@ -161,7 +161,7 @@ impl Evaluator {
     }
 }
 
-/// Whether an expression changes nothing.
+/// Whether an expression has no side effects.
 fn is_side_effect_free(expression: &Expr) -> bool {
     match expression {
         Expr::Path(_) | Expr::Lit(_) => true,

@@ -1,14 +1,15 @@
-//! What stands in the brackets of `#[dae(...)]`, `#[ode(...)]` and `#[function(...)]`.
+//! The arguments of `#[dae(...)]`, `#[ode(...)]` and `#[function(...)]`.
 //!
-//! - `NX = [9, 15]`, `NX = 1..=5`, `NX = 9`: the values of a const parameter to make models of;
-//! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
-//! - `name = Ident`: another name for the model's type;
-//! - `crate = path`: where casados is found;
-//! - `duration = p.duration`: the parameter that time is a multiple of;
-//! - `linear = u.thrust`, `linear = [u[0], u[2]]`: controls that are linear in time;
+//! - `NX = [9, 15]`, `NX = 1..=5`, `NX = 9`: the values of a const parameter for which models are
+//!   generated;
+//! - `(M, N) = [(1, 2), (3, 4)]`: values of several parameters;
+//! - `name = Ident`: another name of the model's type;
+//! - `crate = path`: the path of casados;
+//! - `duration = p.duration`: the parameter that scales time;
+//! - `linear = u.thrust`, `linear = [u[0], u[2]]`: piecewise linear controls;
 //! - `integrals(energy = u * u)`: integrals by name;
-//! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives;
-//! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: equations may be differentiated.
+//! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: nominal values and ranges;
+//! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: index reduction.
 
 use super::augmented_states::{self, AugmentedStates, Integral};
 use super::duration::Duration;
@@ -21,41 +22,41 @@ use syn::parse::{Parse, ParseStream, Parser};
 use syn::spanned::Spanned;
 use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
-/// What an attribute can say.
+/// The possible arguments of an attribute.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
     `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `linear = u`, `integrals(name = ..)`, `nominal(x = ..)`, \
     `range(x = ..)` and \
     `index_reduction`";
 
-/// More models than this in one attribute are taken for a mistake.
+/// Maximum number of models in one attribute; more are considered a mistake.
 const MAX_INSTANCES: usize = 1000;
 
 /// The arguments of an attribute.
 pub struct Arguments {
-    /// Path of the crate, if it is given.
+    /// The path of the crate, if given.
     pub krate: Option<syn::Path>,
-    /// Another name for the model's type.
+    /// Another name of the model's type.
     pub name: Option<Ident>,
-    /// How the index is reduced, if that is asked for.
+    /// The index reduction, if requested.
     pub reduction: Option<Reduction>,
-    /// The parameter that time is a multiple of.
+    /// The parameter that scales time.
     pub duration: Option<Duration>,
-    /// Controls that are linear, and integrals.
+    /// Linear controls and integrals.
     pub extension: AugmentedStates,
-    /// Groups of const parameters with the values that they take together.
+    /// Groups of const parameters with their joint values.
     values: Vec<Values>,
     /// Nominal values and ranges.
     settings: Vec<Setting>,
 }
 
-/// Const parameters and the values that they take together.
+/// Const parameters and their joint values.
 struct Values {
     names: Vec<Ident>,
     rows: Vec<Vec<u64>>,
 }
 
 impl Arguments {
-    /// Reads the tokens in the brackets.
+    /// Parses the arguments.
     pub fn read(tokens: TokenStream) -> Result<Self> {
         let mut arguments = Self {
             krate: None,
@@ -124,12 +125,12 @@ impl Arguments {
         Ok(arguments)
     }
 
-    /// Path of the crate.
+    /// The path of the crate.
     pub fn path(&self) -> syn::Path {
         self.krate.clone().unwrap_or_else(|| syn::parse_quote!(::casados))
     }
 
-    /// Refuses what is said about the model of a module in which every one has its own attribute.
+    /// Rejects arguments for the model of a module in which every model has its own attribute.
     pub fn reject_model_arguments(&self, module: &Ident) -> Result<()> {
         let settings = self.name.is_some()
             || self.reduction.is_some()
@@ -144,20 +145,19 @@ impl Arguments {
         Ok(())
     }
 
-    /// What is known about the values of each of the variables `(ẋ, x, z, u, p, t)`.
+    /// The nominal value and range of each of the variables `(ẋ, x, z, u, p, t)`.
     pub fn samplings(&self, variables: &Variables) -> Result<Vec<Sampling>> {
         sampling::resolve(&self.settings, variables)
     }
 
-    /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges
-    /// could say.
+    /// Rejects nominal values and ranges of functions, which have no unknowns and no plan.
     pub fn reject_settings(&self, what: &str) -> Result<()> {
         let message = format!("nominal values and ranges have no effect for {what}: remove them");
         self.settings.first().map_or(Ok(()), |setting| Err(Error::new(setting.span(), message)))
     }
 
-    /// The models to make: every combination of the values of the const parameters of `generics`.
-    /// One without any for a function that has none.
+    /// The instances of a model: every combination of the values of the const parameters of
+    /// `generics`; a single one without const parameters.
     pub fn instances(&self, generics: &Generics) -> Result<Vec<Vec<Instance>>> {
         let mut parameters = Vec::new();
         for parameter in &generics.params {
@@ -316,7 +316,7 @@ impl Parse for Entry {
     }
 }
 
-/// The values in a list or a range; each row has `width` of them.
+/// The values of a list or a range; each row has `width` of them.
 fn rows(values: &Expr, width: usize) -> Result<Vec<Vec<u64>>> {
     match values {
         Expr::Array(list) => list.elems.iter().map(|row| self::row(row, width)).collect(),

@@ -1,13 +1,12 @@
-//! States that a model gets beside its own: controls that are linear in time, `linear = u`, and
-//! integrals, `integrals(energy = u * u)`.
+//! Augmented states: linear controls, `linear = u`, and integrals, `integrals(energy = u * u)`.
 //!
 //! ```text
 //! ẋ = f(x, c, u, p, t)        ċ = r        q̇ = l(x, c, u, p, t)
 //! ```
 //!
-//! States are then `(x, c, q)`, and the rate `r` of a linear control is the control in its place.
-//! A function with the arguments of the model has the same variables: `u` is `c` there, and it may
-//! have the rates as an argument `du`, and the integrals as an argument `q`.
+//! The states become `(x, c, q)`, and the rate `r` of a linear control `c` replaces it among the
+//! controls. A function with the arguments of the model has the same variables: there `u` is `c`,
+//! and it may have the rates as an argument `du`, and the integrals as an argument `q`.
 
 use super::model::count_in_words;
 use super::units::Units;
@@ -19,31 +18,31 @@ use syn::parse::{Parse, ParseStream};
 use syn::punctuated::Punctuated;
 use syn::{Error, Expr, FnArg, ItemFn, Pat, Result, Token};
 
-/// The variable that stands for rates that there are not.
+/// The index of a missing rate.
 const ABSENT_RATE: usize = u32::MAX as usize;
 
-/// What is said of a model.
+/// The linear controls and integrals of a model's attribute.
 #[derive(Clone, Default)]
 pub struct AugmentedStates {
-    /// Controls that are linear, by names as they are written.
+    /// The names of linear controls, as written.
     pub linear: Vec<(String, Span)>,
-    /// Integrals.
+    /// The integrals.
     pub integrals: Vec<Integral>,
 }
 
-/// An integral, with the integrand where a model says it.
+/// An integral, with its integrand if the attribute is that of a model.
 #[derive(Clone)]
 pub struct Integral {
     pub name: Ident,
     rate: Option<Expr>,
 }
 
-/// The states beside its own that a model has in the end.
+/// The augmented states of a model.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Extra {
-    /// Which of its controls are linear, in the order of the states.
+    /// The indices of linear controls, in the order of the states.
     pub linear: Vec<u32>,
-    /// How many integrals there are.
+    /// The number of integrals.
     pub integrals: usize,
 }
 
@@ -58,7 +57,7 @@ impl Parse for Integral {
     }
 }
 
-/// The arguments of a model, without the underscores of those that it does not use itself.
+/// The arguments of a model, without the underscores of unused ones.
 fn arguments(model: &ItemFn) -> Punctuated<FnArg, Token![,]> {
     let mut inputs = model.sig.inputs.clone();
     for input in &mut inputs {
@@ -72,7 +71,7 @@ fn arguments(model: &ItemFn) -> Punctuated<FnArg, Token![,]> {
     inputs
 }
 
-/// Reads `u`, `u[1]`, `u.thrust`, or a list of these.
+/// Parses `u`, `u[1]`, `u.thrust`, or a list of these.
 pub fn names(span: Span, value: &Expr) -> Vec<(String, Span)> {
     let text = |value: &Expr| {
         let tokens = quote::quote!(#value) as TokenStream;
@@ -85,12 +84,12 @@ pub fn names(span: Span, value: &Expr) -> Vec<(String, Span)> {
 }
 
 impl AugmentedStates {
-    /// Whether nothing is said.
+    /// Whether there are no linear controls and integrals.
     pub fn is_empty(&self) -> bool {
         self.linear.is_empty() && self.integrals.is_empty()
     }
 
-    /// With what is said of the model of a module, where nothing else is.
+    /// These, or those of the module's model if there are none.
     pub fn or(&self, other: &Self) -> Self {
         if self.is_empty() { other.clone() } else { self.clone() }
     }
@@ -110,7 +109,7 @@ impl AugmentedStates {
         self.integrals.iter().map(function).collect()
     }
 
-    /// The controls that are linear.
+    /// The indices of the linear controls.
     fn linear(&self, controls: &[String]) -> Result<Vec<u32>> {
         let mut linear = Vec::new();
         for (name, span) in &self.linear {
@@ -135,8 +134,8 @@ impl AugmentedStates {
         Ok(linear)
     }
 
-    /// Gives a model, or a function of its variables, the states and the rates. Behind the time the
-    /// variables of a function are its arguments `du` and `q`, of which there are so many.
+    /// Adds the states and the rates to a model or to a function of its variables. The variables of
+    /// a function are followed, after the time, by its arguments `du` and `q` with these lengths.
     pub fn add_states(&self, model: &mut Model, rates: &[Node], [of_du, of_q]: [usize; 2]) -> Result<()> {
         if self.is_empty() {
             return Ok(());
@@ -186,7 +185,7 @@ impl AugmentedStates {
         Ok(())
     }
 
-    /// Names and units.
+    /// Sets names and units.
     fn name(&self, model: &mut Model, linear: &[u32]) {
         let (Variables { x, u, .. }, Units { x: of_x, u: of_u, t, .. }) =
             (&mut model.variables, &mut model.units);
@@ -209,7 +208,8 @@ impl AugmentedStates {
         }
     }
 
-    /// Whether the arguments `du` and `q` of a function are as long as there is something.
+    /// Checks that the arguments `du` and `q` of a function have the lengths of rates and
+    /// integrals.
     pub fn check(&self, function: &ItemFn, controls: usize, [of_du, of_q]: [usize; 2]) -> Result<()> {
         let name = &function.sig.ident;
         if of_du > 0 && self.linear.is_empty() {

@@ -1,4 +1,4 @@
-//! Branches: `if`, `match`, and the ways out: `return`, `break`.
+//! Branches: `if`, `match`, and jumps: `return`, `break`.
 
 use super::evaluator::{Evaluated, Evaluator, Flow, Target, TokenSpan, error};
 use super::methods::Receiver;
@@ -8,7 +8,7 @@ use super::value::Value;
 use syn::{Expr, Result};
 
 impl Evaluator {
-    /// `if`: where the condition is known, the branch taken; otherwise both, and a selection.
+    /// `if`: the branch taken for a known condition; otherwise a selection between both.
     pub(super) fn if_expression(&mut self, branch: &syn::ExprIf, expected: &Type) -> Evaluated {
         let saved = self.scope.clone();
         let truth = self.condition(&branch.cond);
@@ -52,7 +52,7 @@ impl Evaluator {
         }
     }
 
-    /// The condition of `if` and `while`: what `let` in it declares is in the scope afterwards.
+    /// The condition of `if` and `while`; variables declared by `let` in it enter the scope.
     pub(super) fn condition(&mut self, expression: &Expr) -> Evaluated<Truth> {
         match expression {
             Expr::Let(inner) => {
@@ -105,7 +105,7 @@ impl Evaluator {
             arms = rest;
             let mut bindings = Vec::new();
             let mut truth = self.matches(&arm.pat, subject.clone(), &mut bindings)?;
-            // The arms of a `match` are exhaustive: the last one is taken if no other is.
+            // The arms of a `match` are exhaustive: the last one is taken if no other matches.
             if rest.is_empty() && matches!(truth, Truth::When(_)) && !matches!(arm.pat, syn::Pat::Guard(_)) {
                 truth = Truth::Known(true);
             }
@@ -145,7 +145,7 @@ impl Evaluator {
         Err(Flow::Return(value))
     }
 
-    /// `return` must not depend on model variables.
+    /// Rejects a `return` that depends on model variables.
     pub(super) fn check_return(&mut self, at: TokenSpan) -> Result<()> {
         if self.open_branch_count() > self.function_branches {
             return Err(error(
@@ -167,7 +167,7 @@ impl Evaluator {
         Err(Flow::Break(inner.label.clone(), value))
     }
 
-    /// `break` and `continue` must not depend on model variables.
+    /// Rejects a `break` or `continue` that depends on model variables.
     pub(super) fn check_target(&mut self, label: Option<String>, at: TokenSpan) -> Result<()> {
         let target = self.targets.iter().rev().find(|(name, target, _)| match &label {
             Some(_) => *name == label,

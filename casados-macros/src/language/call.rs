@@ -1,4 +1,5 @@
-//! Calls: closures, functions that the macro sees, methods of the user's types, built-in functions.
+//! Calls: closures, functions in the macro's input, methods of the user's types, built-in
+//! functions.
 
 use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, opaque_value_error, unsupported};
 use super::methods::{self, Call, Receiver};
@@ -13,7 +14,7 @@ use syn::{Expr, Result, Token};
 pub(super) enum Arguments<'a> {
     /// Values.
     Values(Vec<Value>),
-    /// The receiver, if it is a method call, and expressions.
+    /// The receiver of a method call, and expressions.
     Written(Option<Value>, &'a Punctuated<Expr, Token![,]>),
 }
 
@@ -32,7 +33,7 @@ impl Evaluator {
         self.call_expecting(function, arguments, &Type::Unknown, at)
     }
 
-    /// Calls something of which the context expects a type.
+    /// As [`Evaluator::call`], with the type that the context expects.
     pub fn call_expecting(
         &mut self,
         function: &Value,
@@ -188,9 +189,8 @@ impl Evaluator {
         .into())
     }
 
-    /// Whether a path leads to a method: of a type that is known, or of a trait of the language, of
-    /// a crate that it knows, or that the macro sees. A module that the macro does not see has
-    /// functions of its own.
+    /// Whether a path denotes a method: of a known type, or of a trait of the language, of a known
+    /// crate, or in the macro's input. Functions of modules outside of the input are no methods.
     fn is_method(&self, builtin: &Builtin) -> bool {
         let is_seen = |name: &String| {
             let mut traits = self.implementations.iter().filter_map(|implementation| {
@@ -207,7 +207,7 @@ impl Evaluator {
         }
     }
 
-    /// A method by path: the user's first, then built-in ones.
+    /// A method called by its path: the user's methods first, then built-in ones.
     fn call_method(
         &mut self,
         receiver: &Receiver,
@@ -230,8 +230,8 @@ impl Evaluator {
         Ok(methods::method(self, receiver, &call)?)
     }
 
-    /// Calls a function with arguments as they are written; of several that only differ in their
-    /// arguments the one that these fit.
+    /// Calls a function with unevaluated arguments; of several implementations the one whose
+    /// arguments fit.
     fn call_with_expressions(
         &mut self,
         function: &Function,
@@ -254,7 +254,7 @@ impl Evaluator {
 
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
-        // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
+        // A closure in a field is no method, so that `(self.f)(x)` is handled elsewhere.
         let receiver = self.place_of_type(&call.receiver, true, &receiver_hint(call, &name, expected))?;
         let receiver = self.dereferenced(receiver, &call.receiver)?;
         let turbofish = match &call.turbofish {
@@ -272,7 +272,7 @@ impl Evaluator {
         {
             return Ok(value);
         }
-        // Numbers are copied before the arguments are executed.
+        // Numbers are copied before the arguments are evaluated.
         let receiver = match &receiver {
             Receiver::Place(place) => match self.read(place, call)? {
                 value @ (Value::Real(_) | Value::Integer(_) | Value::Bool(_) | Value::Condition(_)) => {
@@ -305,11 +305,11 @@ impl Evaluator {
     }
 }
 
-/// Crates of which functions are methods.
+/// Crates whose functions are treated as methods.
 const CRATES: &[&str] =
     &["core", "std", "alloc", "nalgebra", "na", "simba", "num_traits", "num_dual", "libm", "casados"];
 
-/// Traits of the language and of those crates, as their methods are called by path.
+/// Traits of the language and of those crates whose methods are called by path.
 #[rustfmt::skip]
 const TRAITS: &[&str] = &[
     "Add", "Sub", "Mul", "Div", "Rem", "Neg", "Not", "AddAssign", "SubAssign", "MulAssign", "DivAssign",
@@ -319,7 +319,7 @@ const TRAITS: &[&str] = &[
     "RealField", "DualNum",
 ];
 
-/// What the context of a call tells about its arguments: `Some(x)` hands its type down.
+/// The expected type of the arguments, from the context of a call: `Some(x)` passes it on.
 fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {
     match (builtin.path.last(), expected) {
         (Some(name), Type::Option(inner)) if name == "Some" => (**inner).clone(),
@@ -327,8 +327,8 @@ fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {
     }
 }
 
-/// What the context of a call tells about its receiver: `n.try_into().unwrap()` hands its type
-/// down.
+/// The expected type of the receiver, from the context of a call: `n.try_into().unwrap()` passes it
+/// on.
 fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Type {
     match &*call.receiver {
         Expr::MethodCall(inner)
@@ -342,7 +342,7 @@ fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Typ
     }
 }
 
-/// What to write instead of a type of nalgebra that a graph model does not have.
+/// The replacement of a nalgebra type that graph models do not support.
 fn replacement_hint(ty: &str) -> Option<&'static str> {
     Some(match ty {
         "Quaternion" | "UnitQuaternion" | "UnitDualQuaternion" | "DualQuaternion" => {

@@ -11,7 +11,7 @@ use quote::ToTokens;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// What is set aside while the body of a function is executed.
+/// The state saved during the execution of a function body.
 pub(super) struct Body {
     pub scope: Rc<Scope>,
     pub calls: Option<Rc<CallStack>>,
@@ -33,7 +33,7 @@ impl Evaluator {
         Ok(Value::Closure(Rc::new(Closure { closure: Rc::new(closure.clone()), scope, calls })))
     }
 
-    /// A scope with copies of the variables that the tokens mention.
+    /// A scope with copies of the variables that occur in the tokens.
     fn captured_scope(&mut self, tokens: TokenStream) -> Rc<Scope> {
         let mut names = Vec::new();
         self.collect_mentioned(tokens, &mut names);

@@ -1,5 +1,4 @@
-//! Values become values of a type: integers get their width, constants from outside are taken
-//! apart.
+//! Coercion of values to a type: integers get their width, constants from outside are split.
 
 use super::evaluator::{Evaluator, TokenSpan, error};
 use super::types::Type;
@@ -9,8 +8,8 @@ use std::rc::Rc;
 use syn::Result;
 
 impl Evaluator {
-    /// The value as one of the type: opaque constants are taken apart, integers get their type,
-    /// `&mut` stays what it is. An error if the shapes do not fit.
+    /// Coerces the value to the type: opaque constants are split, integers get their type, `&mut`
+    /// is unchanged. An error if the shapes differ.
     pub fn coerce(&mut self, value: Value, ty: &Type, at: TokenSpan) -> Result<Value> {
         Ok(match (ty, &value) {
             (Type::Unknown, _) | (_, Value::Reference(_)) => value,
@@ -78,7 +77,7 @@ impl Evaluator {
         })
     }
 
-    /// An opaque constant of a known shape, as a value of opaque parts.
+    /// Splits an opaque constant of a known shape into opaque parts.
     fn split_opaque(&mut self, tokens: &proc_macro2::TokenStream, ty: &Type, at: TokenSpan) -> Result<Value> {
         match ty {
             Type::Real => self.real(&Value::Opaque(Rc::new(tokens.clone())), at).map(Value::Real),

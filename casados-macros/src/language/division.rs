@@ -1,20 +1,20 @@
-//! `(1 / 2) as f64`, which is zero: a warning where two integer literals are divided, a remainder
-//! is lost, and a real number is made of what is left.
+//! Warns about `(1 / 2) as f64`, which is zero: a division of two integer literals with a
+//! remainder, converted to a real number.
 
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::quote;
 use syn::Expr;
 use syn::visit::{self, Visit};
 
-/// Items that make the compiler warn at each such division: on stable toolchains a macro has no
-/// other voice than the use of something deprecated.
+/// Items that cause a compiler warning at each such division: on stable toolchains a macro can warn
+/// only by the use of deprecated items.
 pub fn warnings(item: &syn::Item) -> TokenStream {
     let mut divisions = Divisions(Vec::new());
     divisions.visit_item(item);
     divisions.0.into_iter().map(warning).collect()
 }
 
-/// A division: its operator and its parts.
+/// A division: its operator and its operands.
 type Division = (Span, i128, i128);
 
 fn warning((operator, a, b): Division) -> TokenStream {
@@ -49,7 +49,7 @@ impl<'ast> Visit<'ast> for Divisions {
     }
 }
 
-/// An expression without the brackets around it.
+/// An expression without enclosing parentheses.
 fn without_parentheses(expression: &Expr) -> &Expr {
     match expression {
         Expr::Paren(inner) => without_parentheses(&inner.expr),
@@ -85,7 +85,7 @@ mod tests {
         {
             assert_eq!(of(fine), "", "{fine}");
         }
-        // What is meant may be said in two statements, and an index is meant.
+        // No warning if the conversion is a separate statement, or for an index.
         assert_eq!(of("let half = 7 / 2; half as f64 + (0..3).map(|i| (i / 2) as f64).sum::<f64>()"), "");
     }
 }

@@ -1,5 +1,4 @@
-//! Dual models: functions that are generic over `DualNum`. Their bodies are not read, only their
-//! signatures.
+//! Dual models: functions that are generic over `DualNum`. Only their signatures are parsed.
 
 use super::attribute::Arguments;
 use super::signature::{self, Role};
@@ -11,23 +10,23 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use syn::{Error, Expr, GenericParam, Item, ItemFn, Result, Type};
 
-/// What an attribute stands on, if it is a dual model.
+/// The item of an attribute, if it is a dual model.
 pub struct Source {
-    /// The item as it was written, less attributes that are ours.
+    /// The item as written, without casados attributes.
     pub item: TokenStream,
-    /// Where the generated items go.
+    /// The place of the generated items.
     pub place: Place,
-    /// One model; several where the attribute lists values of const generics.
+    /// One model, or several for the values of const generics.
     pub models: Vec<Model>,
 }
 
 /// A dual model.
 pub struct Model {
-    /// Which attribute.
+    /// The attribute.
     pub form: Form,
-    /// Name of the type.
+    /// The name of the type.
     pub name: Ident,
-    /// Name of the function.
+    /// The name of the function.
     pub function: Ident,
     /// Visibility of the function or module.
     pub visibility: syn::Visibility,
@@ -37,17 +36,17 @@ pub struct Model {
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
-    /// Their units, as far as the documentation says.
+    /// The units of the variables, from the documentation.
     pub units: Units,
-    /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
+    /// The nominal values and ranges of the variables `(ẋ, x, z, u, p, t)`.
     pub samplings: Vec<Sampling>,
     /// The arguments of the function, in its order.
     pub arguments: Vec<Argument>,
     /// Its generic arguments, in its order: the type is `CasadosT`.
     pub generics: Vec<TokenStream>,
-    /// How many equations it returns.
+    /// The number of returned equations.
     pub equations: usize,
-    /// Whether it returns a number rather than an array of one.
+    /// Whether it returns a number, not an array of one.
     pub scalar: bool,
     /// Path of the crate.
     pub krate: syn::Path,
@@ -55,7 +54,7 @@ pub struct Model {
 
 /// An argument of a dual model.
 pub struct Argument {
-    /// What it is.
+    /// The role of the argument.
     pub role: Role,
     /// Its length; `None` for a number.
     pub length: Option<usize>,
@@ -63,7 +62,7 @@ pub struct Argument {
     pub reference: bool,
 }
 
-/// Reads an item if it is a dual model.
+/// Parses an item, if it is a dual model.
 pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Option<Source>> {
     let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item.clone())? {
         Item::Fn(function) => {
@@ -179,7 +178,7 @@ fn generics(function: &ItemFn, instance: &[Instance]) -> Result<Vec<TokenStream>
     Ok(arguments)
 }
 
-/// What a signature says.
+/// The contents of a signature.
 struct Signature {
     variables: Variables,
     arguments: Vec<Argument>,
@@ -240,7 +239,7 @@ impl Signature {
     }
 }
 
-/// `x[0]`, `x[1]`, ...; of a number, its name.
+/// `x[0]`, `x[1]`, ...; for a number, its name.
 fn names(name: &str, length: Option<usize>) -> Vec<String> {
     match length {
         None => vec![name.to_string()],
@@ -252,7 +251,7 @@ fn names(name: &str, length: Option<usize>) -> Vec<String> {
 struct Lengths<'a> {
     instance: &'a [Instance],
     items: &'a [Item],
-    /// The constants that have been evaluated, by their expressions.
+    /// The evaluated constants, by their expressions.
     known: RefCell<HashMap<*const Expr, usize>>,
 }
 
@@ -349,7 +348,7 @@ impl Lengths<'_> {
             }
             _ => None,
         };
-        // The pattern of a dual model is dense: its tables must be sane.
+        // The pattern of a dual model is dense: this limits the size of its tables.
         value.filter(|&value| value <= 10_000).ok_or_else(unknown)
     }
 }

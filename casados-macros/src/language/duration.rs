@@ -1,6 +1,6 @@
-//! A parameter that is the duration of the integrator's unit of time: `duration = p.duration`.
+//! A parameter that scales time, for free end times: `duration = p.duration`.
 //!
-//! With the time `t = T τ` of the model and that of the integrator, `τ`, equations become
+//! With the time `t = T τ` of the model and the time `τ` of the integrator, equations become
 //!
 //! ```text
 //! M ẋ + f(x, z, u, p, t) = 0   →   M x′ + T f(x, z, u, p, T τ) = 0        x′ = dx/dτ = T ẋ
@@ -14,23 +14,23 @@ use proc_macro2::{Span, TokenStream};
 use std::collections::BTreeMap;
 use syn::{Error, Result};
 
-/// The parameter, as it is written.
+/// The parameter.
 #[derive(Clone, Debug)]
 pub struct Duration {
     /// Its name among the parameters.
     pub name: String,
-    /// Where it is written.
+    /// Its place in the source.
     pub span: Span,
 }
 
 impl Duration {
-    /// Reads `p`, `p[1]`, `p.duration`.
+    /// Parses `p`, `p[1]`, `p.duration`.
     pub fn read(span: Span, value: &syn::Expr) -> Self {
         let tokens = quote::quote!(#value) as TokenStream;
         Self { name: tokens.to_string().chars().filter(|c| !c.is_whitespace()).collect(), span }
     }
 
-    /// Makes the time of a model that of its integrator.
+    /// Replaces the time of a model by that of its integrator.
     pub fn scale(&self, model: &mut Model, is_function: bool) -> Result<()> {
         let variables = &model.variables;
         let Some(index) = variables.p.iter().position(|name| *name == self.name) else {
@@ -60,7 +60,7 @@ impl Duration {
     }
 }
 
-/// Equations of `x′` in the place of `ẋ`.
+/// The equations with `x′` instead of `ẋ`.
 fn scaled_residual(graph: &mut Graph, residual: &[Node], nx: u32, duration: Node) -> Vec<Node> {
     let zero = graph.constant(0.0);
     let at_rest: BTreeMap<u32, Node> = (0..nx).map(|state| (state, zero)).collect();

@@ -1,7 +1,7 @@
-//! Scopes: which names stand for which variables and items.
+//! Scopes: the variables and items of names.
 //!
-//! A scope is never changed after it was made: every `let` makes a new one in front of the last. So
-//! a closure that keeps its scope sees what it saw where it was written, and shadowing is free.
+//! Scopes are immutable: every `let` creates a new one inside of the last. A closure therefore
+//! keeps the scope in which it was written, and shadowing needs no special case.
 
 use super::items::{Items, Symbol};
 use super::place::Cell;
@@ -9,26 +9,26 @@ use super::types::Type;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Names, and the scope around them.
+/// Names, and the enclosing scope.
 #[derive(Debug, Default)]
 pub struct Scope {
-    /// The scope around it.
+    /// The enclosing scope.
     pub parent: Option<Rc<Scope>>,
-    /// What it declares.
+    /// The names that it declares.
     pub names: Names,
 }
 
-/// What a scope declares.
+/// The names declared by a scope.
 #[derive(Debug, Default)]
 pub enum Names {
-    /// Nothing.
+    /// No names.
     #[default]
     None,
     /// Variables and const parameters; later ones shadow earlier ones.
     Variables(Vec<(Symbol, Cell)>),
-    /// Type parameters, known as soon as an argument tells.
+    /// Type parameters, bound when an argument determines them.
     Types(Vec<(Symbol, RefCell<Type>)>),
-    /// `Self`, and how the `impl` block writes it.
+    /// `Self`, and its form in the `impl` block.
     SelfType(Type, Option<Rc<syn::Type>>),
     /// Items of a block or module.
     Items(Box<Items>),
@@ -40,12 +40,12 @@ impl Scope {
         Rc::new(Scope { parent: Some(parent.clone()), names })
     }
 
-    /// This scope and those around it, from the inside out.
+    /// This scope and the enclosing ones, from the inside out.
     pub fn enclosing_scopes(self: &Rc<Scope>) -> impl Iterator<Item = &Rc<Scope>> {
         std::iter::successors(Some(self), |scope| scope.parent.as_ref())
     }
 
-    /// The variable of a name, unless an item of that name is nearer.
+    /// The variable of a name, unless an item of an inner scope shadows it.
     pub fn variable(self: &Rc<Scope>, name: Symbol) -> Option<Cell> {
         for scope in self.enclosing_scopes() {
             match &scope.names {
@@ -63,7 +63,7 @@ impl Scope {
 }
 
 impl Drop for Scope {
-    /// Long chains are taken apart in a loop, not by recursion.
+    /// Long chains are dropped in a loop, not by recursion.
     fn drop(&mut self) {
         let mut next = self.parent.take();
         while let Some(scope) = next {

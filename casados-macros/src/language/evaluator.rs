@@ -1,4 +1,4 @@
-//! The state of an evaluation, and what everything else asks of it.
+//! The state of an evaluation, and its basic operations.
 
 use super::Table;
 use super::environment::Scope;
@@ -14,15 +14,16 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use syn::Result;
 
-/// The tokens an error points at.
+/// The tokens of an error.
 pub type TokenSpan<'a> = &'a dyn ToTokens;
 
-/// An error at the user's tokens: one lower-case sentence that says what, and the way out.
+/// An error at the user's tokens: one lower-case sentence with the cause and the remedy.
 pub fn error(at: TokenSpan, message: impl std::fmt::Display) -> syn::Error {
     syn::Error::new_spanned(at, message)
 }
 
-/// An error about what a graph model cannot express: `what` is the subject of the sentence.
+/// An error about a construct that graph models do not support: `what` is the subject of the
+/// sentence.
 pub fn unsupported(at: TokenSpan, what: impl std::fmt::Display) -> syn::Error {
     error(
         at,
@@ -33,17 +34,17 @@ pub fn unsupported(at: TokenSpan, what: impl std::fmt::Display) -> syn::Error {
     )
 }
 
-/// Evaluation steps before a model is taken for one that does not end.
+/// Maximum number of evaluation steps; more are treated as an infinite loop.
 pub const MAX_STEPS: usize = 10_000_000;
-/// Graph nodes before a model is taken for one that does not end.
+/// Maximum number of graph nodes; more are treated as an infinite loop.
 pub const MAX_NODES: usize = 4_000_000;
-/// Nested expressions and calls.
+/// Maximum nesting of expressions and calls.
 pub const MAX_DEPTH: usize = 200;
-/// Bytes of the stack that the evaluation may use. An unoptimised macro needs 4 to 20 kB for a
-/// level, and the smallest threads that macros run in have 2 MiB.
+/// Maximum stack size of an evaluation, in bytes. An unoptimised macro needs 4 to 20 kB per level,
+/// and the smallest threads of macros have 2 MiB.
 const MAX_STACK_BYTES: usize = 5 << 18;
 
-/// Why the evaluation of an expression did not end with its value.
+/// The reason why an expression has no value.
 #[derive(Debug)]
 pub enum Flow {
     /// An error.
@@ -68,43 +69,43 @@ pub type Evaluated<T = Value> = std::result::Result<T, Flow>;
 /// Executes functions symbolically.
 #[derive(Default)]
 pub struct Evaluator {
-    /// The expressions.
+    /// The graph of expressions.
     pub graph: Graph,
-    /// Constants from outside: `Op::Opaque` is an index into this.
+    /// Constants from outside: `Op::Opaque` is an index into this list.
     pub opaque: Vec<TokenStream>,
-    /// Tables: the graph has indices into this.
+    /// Tables: the graph has indices into this list.
     pub tables: Vec<Table>,
-    /// `use` items in bodies, which the opaque constants may need.
+    /// `use` items in bodies, which opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
-    /// What the code that is being executed sees.
+    /// The scope of the executed code.
     pub(super) scope: Rc<Scope>,
-    /// Numbers of names.
+    /// The indices of names.
     pub(super) symbols: HashMap<String, Symbol>,
-    /// All `impl` blocks that have been seen.
+    /// All `impl` blocks so far.
     pub(super) implementations: Vec<Rc<Implementation>>,
     /// Scopes of items, kept alive for the definitions in them.
     pub(super) scopes: Vec<Rc<Scope>>,
-    /// The functions that are being executed.
+    /// The functions in execution.
     pub(super) calls: Option<Rc<CallStack>>,
-    /// Loops and labelled blocks around the code that is being executed, with the number of
-    /// branches on conditions at run time that are around them.
+    /// The enclosing loops and labelled blocks, with the number of enclosing branches on run-time
+    /// conditions.
     pub(super) targets: Vec<(Option<String>, Target, usize)>,
-    /// What the function that is being executed returns.
+    /// The return type of the executed function.
     pub(super) returns: Type,
-    /// The number of branches around the function that is being executed.
+    /// The number of branches around the call of the executed function.
     pub(super) function_branches: usize,
-    /// Whether the pattern that is being matched cannot fail, so that its names are variables.
+    /// Whether the current pattern is irrefutable, so that its names are variables.
     pub(super) irrefutable: bool,
-    /// What has been written to in the branches that are being executed.
+    /// The changes within the branches in execution.
     journals: Vec<Journal>,
     numbers: HashMap<String, u32>,
     steps: usize,
     depth: usize,
-    /// Where the stack was when the evaluation began.
+    /// The stack pointer at the start of the evaluation.
     bottom: Option<usize>,
 }
 
-/// What a `break` can end.
+/// The target of a `break`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A loop.
@@ -113,18 +114,18 @@ pub enum Target {
     Block,
 }
 
-/// Variables that were written to, with their old values.
+/// Changed variables, with their old values.
 #[derive(Default)]
 struct Journal {
     entries: Vec<(Cell, Value)>,
     seen: HashSet<*const std::cell::RefCell<Value>>,
 }
 
-/// What a branch has changed: variables and their new values.
+/// The changes of a branch: variables and their new values.
 pub type Changes = Vec<(Cell, Value)>;
 
 impl Evaluator {
-    /// Counts steps: loops in built-in functions call this once per element.
+    /// Counts steps: loops in built-in functions call this once for each element.
     pub fn count_steps(&mut self, steps: usize, at: TokenSpan) -> Result<()> {
         self.steps = self.steps.saturating_add(steps);
         if self.steps > MAX_STEPS {
@@ -139,7 +140,7 @@ impl Evaluator {
         Ok(())
     }
 
-    /// Executes something one level deeper.
+    /// Evaluates something one nesting level deeper.
     pub(super) fn deeper<T>(
         &mut self,
         at: TokenSpan,
@@ -162,7 +163,7 @@ impl Evaluator {
         result
     }
 
-    /// The result of something that cannot be left by `break`, `continue` or `return`.
+    /// The value of an expression that `break`, `continue` or `return` cannot leave.
     pub(super) fn require_value(&mut self, result: Evaluated, at: TokenSpan) -> Result<Value> {
         match result {
             Ok(value) => Ok(value),
@@ -171,7 +172,7 @@ impl Evaluator {
         }
     }
 
-    /// Notes the value of a variable before it is written to.
+    /// Records the value of a variable before it is changed.
     pub(super) fn save_old_value(&mut self, cell: &Cell) {
         if let Some(journal) = self.journals.last_mut()
             && journal.seen.insert(Rc::as_ptr(cell))
@@ -181,12 +182,12 @@ impl Evaluator {
         }
     }
 
-    /// The number of conditions at run time around what is being executed.
+    /// The number of enclosing run-time conditions.
     pub(super) fn open_branch_count(&self) -> usize {
         self.journals.len()
     }
 
-    /// Executes a branch that may be taken at run time: what it writes is undone, and returned.
+    /// Executes a branch on a run-time condition; returns its changes, after undoing them.
     pub(super) fn branch<T>(
         &mut self,
         execute: impl FnOnce(&mut Self) -> Evaluated<T>,
@@ -197,7 +198,7 @@ impl Evaluator {
         let value = result?;
         let mut changes = Vec::new();
         for (cell, old) in journal.entries {
-            // Variables of the branch itself are gone.
+            // Variables of the branch itself are dropped.
             if Rc::strong_count(&cell) > 1 {
                 let new = cell.replace(old);
                 changes.push((cell, new));
@@ -206,7 +207,7 @@ impl Evaluator {
         Ok((value, changes))
     }
 
-    /// Executes something that happens only if a condition holds at run time.
+    /// Executes code that depends on a run-time condition.
     pub(super) fn run_conditionally<T>(
         &mut self,
         condition: Node,
@@ -223,7 +224,7 @@ impl Evaluator {
         }
     }
 
-    /// Makes the changes of two branches, of which the first is taken if the condition holds.
+    /// Merges the changes of two branches; the first one is taken if the condition holds.
     pub(super) fn merge(&mut self, condition: Node, a: Changes, b: Changes, at: TokenSpan) -> Result<()> {
         let position: HashMap<_, _> =
             b.iter().enumerate().map(|(index, (cell, _))| (Rc::as_ptr(cell), index)).collect();
@@ -249,7 +250,7 @@ impl Evaluator {
         Ok(())
     }
 
-    /// The value as a number. Opaque constants become one here.
+    /// The value as a number. Opaque constants are converted.
     pub fn real(&mut self, value: &Value, at: TokenSpan) -> Result<Node> {
         match value {
             Value::Real(node) => Ok(*node),
@@ -291,7 +292,7 @@ impl Evaluator {
     }
 }
 
-/// An error about a constant of which the value is needed.
+/// The error for a constant whose value is required.
 pub fn opaque_value_error(at: TokenSpan, what: &str) -> syn::Error {
     error(
         at,

@@ -13,7 +13,7 @@ use std::rc::Rc;
 use syn::Expr;
 
 impl Evaluator {
-    /// The value of an expression of which the context expects a type.
+    /// The value of an expression with the expected type of the context.
     pub(super) fn expression(&mut self, expression: &Expr, expected: &Type) -> Evaluated {
         self.deeper(expression, |evaluator| evaluator.expression_within(expression, expected))
     }
@@ -125,7 +125,7 @@ impl Evaluator {
             }
             (Type::Integer(ty), Value::Real(node)) => match self.graph.value(node) {
                 Some(value) => {
-                    // As `as` does it: towards zero, saturating, NaN is 0.
+                    // As `as`: towards zero, saturating, NaN is 0.
                     let value = (value as i128).clamp(ty.min(), ty.max());
                     Value::Integer(Integer { value, ty: Some(ty) })
                 }
@@ -181,7 +181,7 @@ impl Evaluator {
             }
             None => None,
         };
-        // `0..n` is a range of the type of `n`.
+        // The range `0..n` has the type of `n`.
         if let (Some(Value::Integer(a)), Some(Value::Integer(b))) = (&mut start, &mut end) {
             let ty = a.ty.or(b.ty);
             (a.ty, b.ty) = (ty, ty);

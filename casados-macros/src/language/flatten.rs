@@ -1,5 +1,5 @@
-//! Values as flat lists of numbers, in the order of declaration: elements of arrays by index,
-//! fields of structs as they are declared, matrices column after column.
+//! Values as flat lists of numbers, in the order of declaration: arrays by index, structs by field,
+//! matrices in column-major order.
 
 use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::Value;
@@ -46,8 +46,8 @@ impl Evaluator {
     }
 }
 
-/// Where each of the numbers that a block returns is written: its own tokens as far as the last
-/// expression is a literal of the value's shape.
+/// The source position of each returned number of a block: its own tokens, if the last expression
+/// is a literal of the value's shape.
 pub fn spans(block: &Block, value: &Value) -> Vec<Span> {
     let mut spans = Vec::new();
     match block.stmts.last() {
@@ -108,7 +108,7 @@ fn repeat_span(span: Span, value: &Value, spans: &mut Vec<Span>) {
     spans.resize(spans.len() + count(value), span);
 }
 
-/// How many numbers a value has.
+/// The number of numbers in a value.
 fn count(value: &Value) -> usize {
     match value {
         Value::Array(elements) | Value::Tuple(elements) => elements.iter().map(count).sum(),

@@ -1,4 +1,4 @@
-//! Execution of functions that the macro sees: arguments, generic parameters, the body.
+//! Execution of functions in the macro's input: arguments, generic parameters, the body.
 
 use super::call::Arguments;
 use super::closure::Body;
@@ -11,7 +11,7 @@ use super::value::{CallStack, Function, Value};
 use std::rc::Rc;
 
 impl Evaluator {
-    /// Calls a function that the macro sees.
+    /// Calls a function in the macro's input.
     pub(super) fn call_function(
         &mut self,
         function: &Function,
@@ -55,7 +55,7 @@ impl Evaluator {
         if let (Some((implementation, _)), Some(around)) = (&function.owner, &block_scope) {
             self.check_known(&implementation.generics, around, name, at)?;
         }
-        // Now all parameters are known that arguments can tell: `Self` is complete.
+        // Arguments have determined all parameters: `Self` is complete.
         let mut inside = scope;
         if let (Some((implementation, owner)), Some(generics)) = (&function.owner, &block_scope) {
             let own = match &implementation.self_type {
@@ -91,7 +91,7 @@ impl Evaluator {
         Ok(self.coerce(value, &returns, at)?)
     }
 
-    /// Values of the arguments of a call; where the function is generic, they tell its parameters.
+    /// The values of the arguments of a call; they determine the parameters of a generic function.
     fn arguments_of(
         &mut self,
         item: &syn::ItemFn,
@@ -127,7 +127,7 @@ impl Evaluator {
         Ok(values)
     }
 
-    /// A graph of a function that calls itself would have no end.
+    /// Rejects recursion: the graph would be infinite.
     fn check_recursion(&self, item: &Rc<syn::ItemFn>, name: &syn::Ident, at: TokenSpan) -> Evaluated<()> {
         let mut frame = self.calls.clone();
         while let Some(calls) = frame {
@@ -143,8 +143,8 @@ impl Evaluator {
         Ok(())
     }
 
-    /// The value of one argument, as the function has it; `scope` is that of its generic
-    /// parameters, if there are any.
+    /// The value of one argument, with the type of the function; `scope` is that of its generic
+    /// parameters, if any.
     fn argument(
         &mut self,
         input: &syn::FnArg,
@@ -192,7 +192,7 @@ impl Evaluator {
         })
     }
 
-    /// Executes the body of a function or closure: `return` leads to its end.
+    /// Executes the body of a function or closure: `return` ends it.
     pub(super) fn execute(
         &mut self,
         scope: Rc<Scope>,

@@ -1,4 +1,4 @@
-//! Generic parameters: declared in a scope, bound to their arguments, found from the types of
+//! Generic parameters: declared in a scope, bound to their arguments, inferred from the types of
 //! values.
 
 use super::environment::{Names, Scope};
@@ -13,7 +13,7 @@ use std::rc::Rc;
 use syn::Result;
 
 impl Evaluator {
-    /// A scope in which generic parameters are declared, and not known yet.
+    /// A scope that declares generic parameters, unbound.
     pub fn generic_scope(&mut self, generics: &syn::Generics, parent: &Rc<Scope>) -> Rc<Scope> {
         if generics.params.is_empty() {
             return parent.clone();
@@ -37,7 +37,7 @@ impl Evaluator {
         if types.is_empty() { scope } else { Scope::child_scope(&scope, Names::Types(types)) }
     }
 
-    /// Gives generic parameters their explicit arguments.
+    /// Binds generic parameters to explicit arguments.
     pub fn bind_turbofish(&mut self, generics: &syn::Generics, arguments: &[Generic], scope: &Rc<Scope>) {
         let parameters = generics.params.iter().filter_map(|parameter| match parameter {
             syn::GenericParam::Const(parameter) => Some(&parameter.ident),
@@ -50,7 +50,7 @@ impl Evaluator {
         }
     }
 
-    /// An error if there is a const parameter that nothing has told.
+    /// Rejects const parameters that are not determined.
     pub(super) fn check_known(
         &mut self,
         generics: &syn::Generics,
@@ -75,7 +75,7 @@ impl Evaluator {
         Ok(())
     }
 
-    /// What generic parameters are bound to.
+    /// The arguments of generic parameters.
     pub(super) fn bound_arguments(&mut self, generics: &syn::Generics, scope: &Rc<Scope>) -> Vec<Generic> {
         let mut arguments = Vec::new();
         for parameter in &generics.params {
@@ -98,8 +98,8 @@ impl Evaluator {
         arguments
     }
 
-    /// Whether the type can be written like this; generic parameters declared in the scope are
-    /// bound on the way. What is not known fits everything.
+    /// Whether a type matches a pattern; binds generic parameters of the scope. Unknown types match
+    /// everything.
     pub fn unify(&mut self, pattern: &syn::Type, ty: &Type, scope: &Rc<Scope>) -> bool {
         match (pattern, ty) {
             (syn::Type::Reference(inner), _) => self.unify(&inner.elem, ty, scope),
@@ -244,7 +244,7 @@ impl Evaluator {
         }
     }
 
-    /// Types of the fields of a struct or variant.
+    /// The types of the fields of a struct or variant.
     pub fn field_types(
         &mut self,
         definition: &Rc<Definition>,
@@ -256,7 +256,7 @@ impl Evaluator {
         definition.variants[variant].fields.iter().map(|(_, ty)| self.resolve(ty, &scope)).collect()
     }
 
-    /// A value of the type, whose numbers are made by `leaf` from their names (`name[3].position`).
+    /// A value of the type whose numbers `leaf` creates from their names (`name[3].position`).
     pub fn instantiate(
         &mut self,
         ty: &Type,
@@ -333,7 +333,7 @@ fn usize_integer(value: usize) -> Integer {
     Integer { value: value as i128, ty: Some(IntegerType::Usize) }
 }
 
-/// What a type parameter is bound to, if there is one of that name.
+/// The type bound to a type parameter, if there is one of that name.
 fn parameter_type(scope: &Rc<Scope>, name: Symbol) -> Option<Type> {
     scope.enclosing_scopes().find_map(|scope| match &scope.names {
         Names::Types(types) => {
@@ -364,7 +364,7 @@ fn bind(scope: &Rc<Scope>, name: Symbol, argument: &Generic) {
     }
 }
 
-/// Whether two types may be the same, as far as they are known.
+/// Whether two types may be equal, as far as they are known.
 fn may_be_equal(a: &Type, b: &Type) -> bool {
     match (a, b) {
         (Type::Unknown, _) | (_, Type::Unknown) => true,

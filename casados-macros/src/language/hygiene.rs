@@ -1,9 +1,9 @@
-//! Names that `macro_rules!` keeps apart.
+//! Hygiene of `macro_rules!`.
 //!
-//! A variable that a macro declares is another one than a variable of the same name in what the
-//! macro was given. Identifiers compare by their text, so that variables of different contexts get
-//! different texts before a model is executed. Only variables have contexts; items, fields and
-//! methods are found by text.
+//! A variable that a macro declares differs from a variable of the same name in the macro's
+//! arguments. Identifiers compare by their text, so that variables of different contexts are
+//! renamed before a model is executed. Only variables have contexts; items, fields and methods are
+//! found by text.
 
 use proc_macro2::{Group, Ident, TokenStream, TokenTree};
 use std::collections::{HashMap, HashSet};
@@ -11,7 +11,7 @@ use syn::ext::IdentExt;
 use syn::visit::{self, Visit};
 use syn::visit_mut::{self, VisitMut};
 
-/// The context of an identifier: what the compiler prints of it, or nothing where there are none.
+/// The syntax context of an identifier, from its debug output; empty if there is none.
 fn context(ident: &Ident) -> String {
     let text = format!("{:?}", ident.span());
     match text.split_once(' ') {
@@ -20,7 +20,7 @@ fn context(ident: &Ident) -> String {
     }
 }
 
-/// Gives variables of the same name and different contexts different names.
+/// Renames variables with the same name and different contexts.
 pub fn separate_contexts(item: &mut syn::Item) {
     let mut names = ContextCollector::default();
     names.visit_item(item);
@@ -33,11 +33,11 @@ pub fn separate_contexts(item: &mut syn::Item) {
 
 #[derive(Default)]
 struct ContextCollector {
-    /// Contexts in which a name is a variable; the arguments' names keep their text.
+    /// The contexts in which a name is a variable; names of arguments are not changed.
     bound: HashMap<String, HashSet<String>>,
-    /// Contexts in which it occurs.
+    /// The contexts in which it occurs.
     used: HashMap<String, HashSet<String>>,
-    /// Within the signature of a function.
+    /// Whether the visitor is in the signature of a function.
     arguments: bool,
 }
 
@@ -87,7 +87,7 @@ struct ContextRenamer {
 }
 
 impl ContextRenamer {
-    /// The name of a variable of this context.
+    /// Renames a variable by its context.
     fn rename(&self, ident: &mut Ident) {
         let Some(contexts) = self.bound.get(&ident.to_string()) else { return };
         let context = context(ident);
@@ -97,7 +97,7 @@ impl ContextRenamer {
         }
     }
 
-    /// Identifiers of a macro's arguments, but for fields and methods.
+    /// Renames the identifiers in a macro's arguments, except fields and methods.
     fn tokens(&self, tokens: TokenStream) -> TokenStream {
         let mut is_member = false;
         let renamed = tokens.into_iter().map(|token| {

@@ -11,19 +11,19 @@ use std::rc::Rc;
 pub struct Implementation {
     /// Its generic parameters.
     pub generics: syn::Generics,
-    /// The type it is for; `None` for the defaults of a trait.
+    /// The implementing type; `None` for the defaults of a trait.
     pub self_type: Option<Rc<syn::Type>>,
     /// The trait and its generic arguments.
     pub of: Option<syn::Path>,
-    /// Functions.
+    /// The functions.
     pub functions: HashMap<Symbol, Rc<syn::ItemFn>>,
-    /// Constants: of generic blocks their values depend on the type.
+    /// The constants; those of generic blocks depend on the type.
     pub constants: HashMap<Symbol, Rc<Constant>>,
-    /// Where it stands.
+    /// The enclosing scope.
     pub scope: Rc<Scope>,
 }
 
-/// What an `impl` block or a trait has.
+/// A member of an `impl` block or a trait.
 enum Member {
     /// A function: its modifiers, signature and body.
     Function(syn::FnModifiers, Box<syn::Signature>, Box<syn::Block>),
@@ -32,7 +32,7 @@ enum Member {
 }
 
 impl Evaluator {
-    /// An `impl` block.
+    /// Registers an `impl` block.
     pub(super) fn register_impl(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
         let members = item.items.iter().filter_map(|entry| match entry {
             syn::ImplItem::Fn(function) => Some(Member::Function(
@@ -48,7 +48,7 @@ impl Evaluator {
         self.members(members, (item.generics.clone(), self_type, of), scope);
     }
 
-    /// The defaults of a trait.
+    /// Registers the defaults of a trait.
     pub(super) fn defaults(&mut self, item: &syn::ItemTrait, scope: &Rc<Scope>) {
         let members = item.items.iter().filter_map(|entry| match entry {
             syn::TraitItem::Fn(function) => {

@@ -1,4 +1,4 @@
-//! Items that the macro sees: functions, constants, types, `impl` blocks, `use`.
+//! Items in the macro's input: functions, constants, types, `impl` blocks, `use`.
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
@@ -20,17 +20,17 @@ pub struct Items {
     pub values: HashMap<Symbol, ValueItem>,
     /// Structs, enums and aliases.
     pub types: HashMap<Symbol, TypeItem>,
-    /// Modules in this one.
+    /// Nested modules.
     pub modules: HashMap<Symbol, Rc<Scope>>,
     /// `use` of single names.
     pub uses: HashMap<Symbol, Vec<String>>,
-    /// `use` of everything in a module.
+    /// Glob imports.
     pub globs: Vec<Vec<String>>,
-    /// Which module it is; nothing for a block.
+    /// The module; nothing for a block.
     pub module: Option<Module>,
 }
 
-/// What a name stands for as a value.
+/// The value item of a name.
 #[derive(Clone, Debug)]
 pub enum ValueItem {
     /// A function.
@@ -39,7 +39,7 @@ pub enum ValueItem {
     Constant(Rc<Constant>),
 }
 
-/// What a name stands for as a type.
+/// The type item of a name.
 #[derive(Clone, Debug)]
 pub enum TypeItem {
     /// A struct or enum.
@@ -48,7 +48,7 @@ pub enum TypeItem {
     Alias(Rc<syn::ItemType>),
 }
 
-/// A `const` or `static`, evaluated when it is used first.
+/// A `const` or `static`, evaluated on first use.
 #[derive(Debug)]
 pub struct Constant {
     /// Its name, for errors.
@@ -61,24 +61,24 @@ pub struct Constant {
     pub state: RefCell<State>,
 }
 
-/// How far the evaluation of a constant is.
+/// The progress of the evaluation of a constant.
 #[derive(Clone, Debug)]
 pub enum State {
-    /// Not begun.
+    /// Not evaluated.
     Written,
-    /// Begun: a use of it now is a cycle.
+    /// In evaluation: a use is a cycle.
     Begun,
-    /// Done.
+    /// Evaluated.
     Done(Value),
 }
 
 impl Evaluator {
-    /// The number of a name.
+    /// The index of a name.
     pub fn symbol(&mut self, name: &syn::Ident) -> Symbol {
         self.symbol_of(&name.to_string())
     }
 
-    /// The number of a name.
+    /// The index of a name.
     pub fn symbol_of(&mut self, name: &str) -> Symbol {
         if let Some(&symbol) = self.symbols.get(name) {
             return symbol;
@@ -88,17 +88,17 @@ impl Evaluator {
         symbol
     }
 
-    /// The scope of a module; `impl` blocks are known from now on.
+    /// The scope of a module; registers its `impl` blocks.
     pub fn module<'a>(
         &mut self,
         items: impl Iterator<Item = &'a syn::Item> + Clone,
         module: Module,
     ) -> Result<Rc<Scope>> {
-        // What is around a module is not seen in it.
+        // A module does not see the items around it.
         self.declare_items(items, &Rc::default(), Some(module))
     }
 
-    /// The scope of the items of a block inside of another; `impl` blocks are known from now on.
+    /// The scope of the items of a block; registers its `impl` blocks.
     pub fn items<'a>(
         &mut self,
         items: impl Iterator<Item = &'a syn::Item> + Clone,
@@ -266,7 +266,7 @@ impl Evaluator {
         }
     }
 
-    /// Whether a `use` names something that the macro sees: generated code does not need it.
+    /// Whether a `use` refers to an item in the macro's input, which generated code does not need.
     fn is_local(&mut self, tree: &syn::UseTree, scope: &Rc<Scope>) -> bool {
         let syn::UseTree::Path(tree) = tree else { return false };
         let first = self.symbol(&tree.ident);
@@ -276,7 +276,7 @@ impl Evaluator {
         })
     }
 
-    /// The value of a constant; its expression sees what the constant sees.
+    /// The value of a constant, evaluated in its own scope.
     pub fn constant_value(&mut self, constant: &Constant, scope: &Rc<Scope>) -> Result<Value> {
         let state = constant.state.borrow().clone();
         match state {
@@ -295,7 +295,7 @@ impl Evaluator {
         value
     }
 
-    /// A constant expression of a type, in a scope.
+    /// Evaluates a constant expression of a type in a scope.
     pub fn constant_expression(
         &mut self,
         expression: &syn::Expr,

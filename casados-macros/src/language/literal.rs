@@ -93,7 +93,7 @@ impl Evaluator {
             }
         }
         if !matches!(ty, Type::Struct(..)) {
-            // A variant that a `use` has brought here.
+            // A variant imported by a `use`.
             let path = syn::ExprPath { attrs: Vec::new(), qself: None, path: literal.path.clone() };
             if let PathMeaning::Value(Value::Constructor(owner, index)) = self.path_meaning(&path)? {
                 (ty, variant) = (owner, index);
@@ -126,7 +126,7 @@ impl Evaluator {
             let value = self.expression(&field.expr, &types[index])?;
             fields[index] = self.coerce(value, &types[index], &field.expr)?;
         }
-        // `..rest` is executed after the fields.
+        // `..rest` is evaluated after the fields.
         if let Some(rest) = &literal.rest {
             let own = Type::Struct(definition.clone(), arguments.clone());
             let value = self.expression(rest, &own)?;

@@ -1,13 +1,13 @@
-//! Mistakes that do not follow from each other are reported together.
+//! Collection of independent errors, which are reported together.
 
 use syn::{Error, Result};
 
-/// The mistakes found so far.
+/// The errors so far.
 #[derive(Default)]
 pub struct CollectedErrors(Option<Error>);
 
 impl CollectedErrors {
-    /// One more.
+    /// Adds an error.
     pub fn note(&mut self, error: Error) {
         match &mut self.0 {
             Some(errors) => errors.combine(error),
@@ -15,7 +15,7 @@ impl CollectedErrors {
         }
     }
 
-    /// An error if there is any.
+    /// The errors, if there are any.
     pub fn into_result(self) -> Result<()> {
         self.0.map_or(Ok(()), Err)
     }

@@ -1,5 +1,4 @@
-//! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes
-//! its body.
+//! From Rust tokens to a graph: the signature of a model, and the partial evaluator of its body.
 
 mod access;
 mod arithmetic;
@@ -55,19 +54,19 @@ pub use reduction::{Rates, Reduction};
 pub use sampling::Sampling;
 use units::Units;
 
-/// Which attribute.
+/// The attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// The function returns the residual `f(ẋ, x, u, z, p, t)`.
     Dae,
     /// The function returns `ẋ`; the graph's residual is `ẋ − g(x, u, p, t)`.
     Ode,
-    /// The function returns any numbers `y(x, u, z, p, t)`; they stand for the residual.
+    /// The function returns any numbers `y(x, u, z, p, t)`, which are stored as the residual.
     Function,
 }
 
 impl Form {
-    /// The attribute of a name.
+    /// The attribute with this name.
     pub fn by_name(name: &str) -> Option<Self> {
         Some(match name {
             "dae" => Self::Dae,
@@ -77,7 +76,7 @@ impl Form {
         })
     }
 
-    /// What the function is, with its article.
+    /// The description of the function, with an article.
     pub fn description(self) -> &'static str {
         match self {
             Self::Dae | Self::Ode => "a model",
@@ -86,7 +85,7 @@ impl Form {
     }
 }
 
-/// Where the generated items go.
+/// The place of the generated items.
 #[derive(Clone, Debug)]
 pub enum Place {
     /// Beside the item (a function).
@@ -95,73 +94,73 @@ pub enum Place {
     Inside,
 }
 
-/// What an attribute stands on, understood.
+/// The parsed item of an attribute.
 pub struct Source {
-    /// The item as it was written, less attributes that are ours.
+    /// The item as written, without casados attributes.
     pub item: TokenStream,
-    /// Where the generated items go.
+    /// The place of the generated items.
     pub place: Place,
-    /// The function; of a module those with attributes of their own too.
+    /// The function; for a module also those with their own attributes.
     pub parts: Vec<ModelOrFunctions>,
-    /// Items at which the compiler warns of what is right, but hardly meant.
+    /// Items that cause compiler warnings about valid, but probably unintended code.
     pub warnings: TokenStream,
 }
 
-/// What a function is read as.
+/// The models or functions read from a Rust function.
 pub struct ModelOrFunctions {
-    /// Which attribute.
+    /// The attribute.
     pub form: Form,
-    /// Name of the function, or of the module that it stands for.
+    /// The name of the function, or of its module.
     pub original: syn::Ident,
-    /// One model; several where the attribute lists values of const generics.
+    /// One model, or several for the values of const generics.
     pub models: Vec<Model>,
 }
 
 /// A model as a graph.
 pub struct Model {
-    /// Name of the type: that of the function or module in upper camel case.
+    /// The name of the type: that of the function or module in upper camel case.
     pub name: syn::Ident,
     /// Visibility of the function or module.
     pub visibility: syn::Visibility,
     /// Documentation attributes of the item.
     pub documentation: Vec<syn::Attribute>,
-    /// Values of the const parameters, if the model has any: `impl Dae for Chain<9>`.
+    /// The values of the const parameters, if any: `impl Dae for Chain<9>`.
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
-    /// Their units, as far as the documentation says.
+    /// The units of the variables, from the documentation.
     pub units: Units,
-    /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
+    /// The nominal values and ranges of the variables `(ẋ, x, z, u, p, t)`.
     pub samplings: Vec<Sampling>,
-    /// How its index is reduced, if the attribute asks for that.
+    /// The index reduction, if requested.
     pub reduction: Option<Reduction>,
-    /// Which parameter time is a multiple of, if one is.
+    /// The parameter that scales time, if any.
     pub duration: Option<u32>,
-    /// States that it has beside its own.
+    /// The augmented states.
     pub extra: Extra,
-    /// Whether it has equations: functions have none.
+    /// Whether it has equations, unlike a function.
     pub is_model: bool,
-    /// The expressions.
+    /// The graph of expressions.
     pub graph: Graph,
     /// `f`, one node per equation.
     pub residual: Vec<Node>,
-    /// Where each equation was written: what errors about it point at.
+    /// The source position of each equation, for errors.
     pub spans: Vec<Span>,
     /// Constants from outside, as Rust expressions of type `f64`; `Op::Opaque` is an index into
-    /// this.
+    /// this list.
     pub opaque: Vec<TokenStream>,
-    /// Its tables; `graph::Table` has an index into this.
+    /// The tables; `graph::Table` has an index into this list.
     pub tables: Vec<Table>,
-    /// `use` items in the body, which the opaque constants may need.
+    /// `use` items in the body, which opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
-    /// Path of the crate: `::casados` unless the attribute says `crate = path`.
+    /// The path of the crate: `::casados` unless the attribute has `crate = path`.
     pub krate: syn::Path,
 }
 
 /// A table of a model.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// A constant expression of a type of `casados::tables`, which is `casados_tables` in it.
+    /// A constant expression of a type of `casados::tables`, which it calls `casados_tables`.
     pub expression: TokenStream,
     /// The number of its variables.
     pub variables: usize,
@@ -172,15 +171,15 @@ pub struct Table {
 pub struct Instance {
     /// Its name.
     pub name: syn::Ident,
-    /// Its type, `usize` as a rule.
+    /// Its type, usually `usize`.
     pub ty: syn::Type,
     /// Its value.
     pub value: u64,
 }
 
-/// Names of the variables, flattened: `x[3]`, `cart.position`. Their numbers are the dimensions.
-/// Index in the graph: `ẋ`, `x`, `z`, `u`, `p`, `t`, one after the other; `t` is always the last,
-/// used or not.
+/// The names of the variables, flattened: `x[3]`, `cart.position`. Their numbers are the
+/// dimensions. The order of indices in the graph is `ẋ`, `x`, `z`, `u`, `p`, `t`; `t` is always the
+/// last, even if unused.
 #[derive(Clone, Debug, Default)]
 pub struct Variables {
     /// Differential states (and their derivatives).
@@ -193,7 +192,7 @@ pub struct Variables {
     pub p: Vec<String>,
 }
 
-/// Reads an item.
+/// Parses an item.
 pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Result<Source> {
     let arguments = Arguments::read(attribute)?;
     let written = item.clone();
@@ -227,7 +226,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
     }
 }
 
-/// The model of a module, and its functions with attributes of their own.
+/// The model of a module, and its functions with their own attributes.
 fn model_and_functions(
     form: Form,
     arguments: &Arguments,
@@ -304,7 +303,7 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
     instances.into_iter().map(model).collect()
 }
 
-/// The functions of a module with attributes of their own, and what stands in these.
+/// The functions of a module with their own attributes, and the arguments of these.
 pub fn attributed_functions(module: &mut syn::ItemMod) -> Vec<(syn::Signature, TokenStream)> {
     let marked = module::take_attributed_functions(module);
     let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
@@ -315,7 +314,7 @@ pub fn attributed_functions(module: &mut syn::ItemMod) -> Vec<(syn::Signature, T
     marked.into_iter().filter_map(signature).collect()
 }
 
-/// The name of the type of a model, as far as its attribute can be read.
+/// The name of a model's type, as far as its attribute can be parsed.
 pub fn model_name(attribute: TokenStream, item: &syn::Ident) -> syn::Ident {
     let named = Arguments::read(attribute).ok().and_then(|arguments| arguments.name);
     named.unwrap_or_else(|| signature::type_name(item))

@@ -1,5 +1,5 @@
-//! From a model function, and the items around it, to a graph: the variables are made, the function
-//! is called with them, and the numbers that it returns are the residual.
+//! From a model function, and the items around it, to a graph: the function is called with the
+//! variables, and the returned numbers are the residual.
 
 use super::augmented_states::{AugmentedStates, Extra};
 use super::environment::{Names, Scope};
@@ -18,13 +18,13 @@ use crate::graph::{Binary, Node};
 use std::rc::Rc;
 use syn::{Error, Item, ItemFn, Result};
 
-/// What is the same for all instances of a model.
+/// The data shared by all instances of a model.
 pub struct Template<'a> {
-    /// Which attribute.
+    /// The attribute.
     pub form: Form,
     /// The model function.
     pub function: &'a ItemFn,
-    /// The items around it, itself included; none if it stands alone.
+    /// The items of its module, itself included; none if it stands alone.
     pub items: &'a [Item],
     /// Name of the type.
     pub name: syn::Ident,
@@ -37,7 +37,7 @@ pub struct Template<'a> {
 }
 
 impl Template<'_> {
-    /// The model with these values of the const parameters.
+    /// The model for these values of the const parameters.
     pub fn instantiate(&self, instance: Vec<Instance>, extension: &AugmentedStates) -> Result<Model> {
         let arguments = signature::arguments(self.form, self.function)?;
         let mut evaluator = Evaluator::default();
@@ -108,7 +108,7 @@ impl Template<'_> {
         Ok(model)
     }
 
-    /// How long the arguments `du` and `q` are.
+    /// The lengths of the arguments `du` and `q`.
     fn extra_argument_lengths(
         &self,
         arguments: &[Argument],
@@ -233,7 +233,7 @@ fn label_texts(labels: &[Label], text: impl Fn(&Label) -> &String) -> Vec<String
     labels.iter().map(text).cloned().collect()
 }
 
-/// The units that fields of the arguments have.
+/// The units of fields of the arguments.
 fn units(arguments: &[Argument], labels: &[Vec<Label>]) -> Units {
     let of = |role: Role| {
         let position = arguments.iter().position(|argument| argument.role == role)?;
@@ -244,7 +244,7 @@ fn units(arguments: &[Argument], labels: &[Vec<Label>]) -> Units {
     Units { x, z: all(Role::Z), u: all(Role::U), p: all(Role::P), ..Units::default() }
 }
 
-/// Types of arguments and labels of their numbers: a dry run, since the position of a variable
+/// The types of arguments and the labels of their numbers, from a dry run: the index of a variable
 /// depends on all dimensions.
 fn types_and_labels(
     arguments: &[Argument],
@@ -282,12 +282,12 @@ fn types_and_labels(
     Ok((types, labels))
 }
 
-/// So many numbers, in words.
+/// A number of values, in words.
 pub(super) fn count_in_words(n: usize) -> String {
     if n == 1 { "1 number".to_owned() } else { format!("{n} numbers") }
 }
 
-/// Where the numbers of a role begin among the variables `(ẋ, x, z, u, p, t)`.
+/// The index of the first variable with a role among `(ẋ, x, z, u, p, t)`.
 fn offset(Variables { x, z, u, p }: &Variables, role: Role) -> u32 {
     let offset = match role {
         Role::Xdot => 0,

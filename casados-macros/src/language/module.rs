@@ -1,22 +1,22 @@
-//! `#[dae] mod name { .. }`: which of the functions is the model, and which have attributes of
-//! their own.
+//! `#[dae] mod name { .. }`: selects the model function, and the functions with their own
+//! attributes.
 
 use super::Form;
 use super::signature::Role;
 use proc_macro2::TokenStream;
 use syn::{Error, FnArg, Item, ItemFn, ItemMod, Meta, Pat, Result};
 
-/// A function of a module with an attribute of its own.
+/// A function of a module with its own attribute.
 pub struct AttributedFunction {
     /// Its index among the items.
     pub index: usize,
-    /// Which attribute.
+    /// The attribute.
     pub form: Form,
-    /// What stands in the brackets of the attribute.
+    /// The arguments of the attribute.
     pub attribute: TokenStream,
 }
 
-/// Takes `#[dae]`, `#[ode]` and `#[function]` off the functions of a module that bear them.
+/// Removes `#[dae]`, `#[ode]` and `#[function]` from the functions of a module.
 pub fn take_attributed_functions(module: &mut ItemMod) -> Vec<AttributedFunction> {
     let items = module.content.iter_mut().flat_map(|(_, items)| items);
     let functions = items.enumerate().filter_map(|(index, item)| match item {
@@ -39,10 +39,10 @@ pub fn take_attributed_functions(module: &mut ItemMod) -> Vec<AttributedFunction
     list
 }
 
-/// Takes the mark `#[model]` off the function that bears it, and returns the index of the model
-/// function among the items: the marked one; or the only one whose arguments are those of a model;
-/// or, of several, the one that is named like the module. Functions with an attribute of their own
-/// are not meant; where they are models and no other is, there is none.
+/// Removes the mark `#[model]`, and returns the index of the model function among the items: the
+/// marked one; or the only one with the arguments of a model; or, of several, the one named like
+/// the module. Functions with their own attribute are excluded; if these are models and there is no
+/// other, there is none.
 pub fn model_function(
     form: Form,
     module: &mut ItemMod,
@@ -81,7 +81,7 @@ pub fn model_function(
     };
     let models: Vec<_> =
         functions().filter(|(_, function)| roles(function).all(|role| role.is_some())).collect();
-    // If none fits in all arguments, the error is about those of the nearest one.
+    // If no function has all arguments, the error is about the closest one.
     let candidates = if models.is_empty() { functions().collect() } else { models };
     match candidates.as_slice() {
         [] if others.iter().any(|other| (other.form == Form::Function) == (form == Form::Function)) => {
@@ -106,7 +106,7 @@ pub fn model_function(
     }
 }
 
-/// What each argument of a function would be in a model.
+/// The role of each argument of a function in a model.
 fn roles(function: &ItemFn) -> impl Iterator<Item = Option<Role>> {
     function.sig.inputs.iter().map(|input| match input {
         FnArg::Typed(input) => match &*input.pat {

@@ -1,4 +1,4 @@
-//! Modules that the macro sees: where paths and `use` lead.
+//! Modules in the macro's input: resolution of paths and `use`.
 
 use super::environment::{Names, Scope};
 use super::evaluator::Evaluator;
@@ -6,27 +6,27 @@ use super::items::{Items, Symbol, TypeItem};
 use std::cell::OnceCell;
 use std::rc::{Rc, Weak};
 
-/// A module among those that the macro sees.
+/// A module in the macro's input.
 #[derive(Debug, Default)]
 pub struct Module {
-    /// The names that lead to it from the outermost one.
+    /// The path to it from the outermost module.
     pub names: Vec<String>,
-    /// The module around it, if the macro sees it.
+    /// The enclosing module, if it is in the macro's input.
     pub around: OnceCell<Weak<Scope>>,
 }
 
-/// Where a path to a module leads.
+/// The target of a path to a module.
 pub(super) enum PathTarget {
-    /// To a module that the macro sees.
+    /// A module in the macro's input.
     Module(Rc<Scope>),
-    /// Out of them, or to something else: a crate, a type.
+    /// Anything else: a crate, a type.
     Elsewhere,
 }
 
-/// The modules that a search has been in, so that it ends where each of two uses the other.
+/// The modules visited by a search, so that it ends for circular uses.
 pub(super) type VisitedModules = Vec<*const Scope>;
 
-/// `use` items that lead to each other are followed so far.
+/// Maximum number of `use` items in a chain.
 pub(super) const MAX_USE_LINKS: usize = 64;
 
 /// The items of a scope, if it has any.
@@ -42,24 +42,24 @@ pub(super) fn module_of(scope: &Rc<Scope>) -> Option<&Rc<Scope>> {
     scope.enclosing_scopes().find(|scope| items(scope).is_some_and(|items| items.module.is_some()))
 }
 
-/// The names from the outermost module that the macro sees to the one around a scope.
+/// The path from the outermost module in the macro's input to the one around a scope.
 pub(super) fn module_path(scope: &Rc<Scope>) -> &[String] {
     let module = module_of(scope).and_then(|module| items(module)).and_then(|items| items.module.as_ref());
     module.map_or(&[], |module| &module.names)
 }
 
-/// The module around the innermost one.
+/// The module that encloses the innermost one.
 fn around(scope: &Rc<Scope>) -> Option<Rc<Scope>> {
     let module = items(module_of(scope)?)?.module.as_ref()?;
     module.around.get()?.upgrade()
 }
 
-/// The full path of a name that a `use` has brought here, and where that stands.
+/// The full path of a name imported by a `use`, and the scope of the `use`.
 pub(super) fn used_path(scope: &Rc<Scope>, name: Symbol) -> Option<(Vec<String>, Rc<Scope>)> {
     scope.enclosing_scopes().find_map(|scope| Some((items(scope)?.uses.get(&name)?.clone(), scope.clone())))
 }
 
-/// The path from the outermost module that the macro sees, of one that begins with `self` or
+/// The path from the outermost module in the macro's input, for one that starts with `self` or
 /// `super` in an inner one.
 pub(super) fn from_outermost(path: Vec<String>, scope: &Rc<Scope>) -> Vec<String> {
     let names = module_path(scope);
@@ -77,7 +77,7 @@ pub(super) fn from_outermost(path: Vec<String>, scope: &Rc<Scope>) -> Vec<String
 }
 
 impl Evaluator {
-    /// Where the names of a path lead that is written in a scope.
+    /// The target of a path written in a scope.
     pub(super) fn resolve_module_path(
         &mut self,
         names: &[String],
@@ -117,7 +117,7 @@ impl Evaluator {
         current.map_or(PathTarget::Elsewhere, PathTarget::Module)
     }
 
-    /// The type that a path leads to, and where it stands.
+    /// The type that a path denotes, and its scope.
     pub(super) fn resolve_type(
         &mut self,
         path: &[String],
@@ -135,7 +135,7 @@ impl Evaluator {
         places.iter().find_map(|place| self.type_in(symbol, place, trail))
     }
 
-    /// The type of a name among the items of a scope, or brought there by a `use`.
+    /// The type of a name among the items of a scope, or imported by a `use`.
     pub(super) fn type_in(
         &mut self,
         symbol: Symbol,
@@ -166,8 +166,8 @@ impl Evaluator {
         None
     }
 
-    /// A `use` as generated code needs it, which stands in the outermost module: of one in an inner
-    /// module nothing but globs, as other names have full paths.
+    /// A `use` for generated code, which is in the outermost module: of inner modules only globs,
+    /// since other names have full paths.
     pub(super) fn emitted_use(&mut self, item: &syn::ItemUse, scope: &Rc<Scope>) -> Option<syn::ItemUse> {
         let names = module_path(scope);
         if names.is_empty() {
@@ -187,14 +187,14 @@ impl Evaluator {
         if std::ptr::eq(tree, &raw const item.tree) {
             return Some(item.clone());
         }
-        // Of modules that the macro sees it knows the names.
+        // The names of modules in the macro's input are known.
         let up = up.checked_sub(names.len()).filter(|up| *up > 0)?;
         let above = std::iter::repeat_n(quote::quote!(super::), up);
         syn::parse2(quote::quote!(use #(#above)* #tree;)).ok()
     }
 }
 
-/// Whether a `use` brings everything of a module.
+/// Whether a `use` has a glob.
 fn has_glob(tree: &syn::UseTree) -> bool {
     match tree {
         syn::UseTree::Path(path) => has_glob(&path.tree),

@@ -8,7 +8,7 @@ use super::value::{Integer, Value};
 use syn::Expr;
 
 impl Evaluator {
-    /// Sums of many terms nest to the left: they are walked in a loop.
+    /// Sums of many terms nest to the left: they are evaluated in a loop.
     pub(super) fn binary_expression(&mut self, binary: &syn::ExprBinary, expected: &Type) -> Evaluated {
         let mut spine = vec![binary];
         while let Expr::Binary(left) = &*spine[spine.len() - 1].left {
@@ -69,8 +69,7 @@ impl Evaluator {
                 Ok(self.follow_value(right, &binary.right)?)
             }
             Truth::When(node) => {
-                // The right side is executed only if the left one says so; what it changes depends
-                // on that.
+                // The right side is executed depending on the left one, and so are its changes.
                 let saved = self.scope.clone();
                 let result = self.branch(|evaluator| evaluator.expression(&binary.right, &Type::Bool));
                 self.scope = saved;
@@ -103,7 +102,7 @@ impl Evaluator {
     }
 }
 
-/// The operators that yield numbers.
+/// The operators that return numbers.
 pub(super) fn operator(op: &syn::BinOp) -> Option<Operator> {
     Some(match op {
         syn::BinOp::Add(_) => Operator::Add,

@@ -1,4 +1,4 @@
-//! What paths stand for: variables, items, associated functions and constants, built-in functions.
+//! Resolution of paths: variables, items, associated functions and constants, built-in functions.
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluated, Evaluator, TokenSpan};
@@ -16,18 +16,18 @@ use syn::Result;
 use syn::ext::IdentExt;
 use syn::parse::Parser;
 
-/// What a path stands for.
+/// The meaning of a path.
 pub enum PathMeaning {
     /// A variable.
     Variable(Cell),
-    /// A value: a constant or a function that the macro sees.
+    /// A value: a constant or a function in the macro's input.
     Value(Value),
-    /// Something that the macro does not see: part of the language, or from outside.
+    /// Anything else: part of the language, or from outside.
     Builtin(Builtin),
 }
 
 impl Evaluator {
-    /// What a path in an expression stands for.
+    /// The meaning of a path in an expression.
     pub(super) fn path_meaning(&mut self, path: &syn::ExprPath) -> Evaluated<PathMeaning> {
         let scope = self.scope.clone();
         let Some(last) = path.path.segments.last() else {
@@ -81,8 +81,8 @@ impl Evaluator {
         Ok(PathMeaning::Builtin(Builtin { owner: None, path: full, turbofish }))
     }
 
-    /// The segments of a path, with a local `use` of the first one resolved, from the outermost
-    /// module that the macro sees.
+    /// The segments of a path from the outermost module in the macro's input, with a local `use` of
+    /// the first one resolved.
     fn full_path(&mut self, path: &syn::Path, scope: &Rc<Scope>) -> Vec<String> {
         let mut segments = path.segments.iter().map(|segment| segment.ident.to_string());
         let first = segments.next().unwrap_or_default();
@@ -146,7 +146,7 @@ impl Evaluator {
         Ok(PathMeaning::Builtin(Builtin { owner: None, path: vec![ident.to_string()], turbofish }))
     }
 
-    /// What `use path::*;` brings under a name.
+    /// The name, if `use path::*;` imports it.
     fn glob(
         &mut self,
         path: &[String],
@@ -180,7 +180,7 @@ impl Evaluator {
         Ok(methods::constant(self, &builtin).map(PathMeaning::Value))
     }
 
-    /// What a path that was written in a `use` stands for.
+    /// The meaning of a path written in a `use`.
     fn used_path(
         &mut self,
         full: Vec<String>,
@@ -260,7 +260,7 @@ impl Evaluator {
         }))
     }
 
-    /// The scope of an implementation for a type, or nothing if it is for others.
+    /// The scope of an implementation for a type; nothing if it does not apply.
     pub(super) fn matching_impl_scope(
         &mut self,
         implementation: &Rc<Implementation>,
@@ -270,7 +270,7 @@ impl Evaluator {
         match &implementation.self_type {
             Some(pattern) => self.unify(pattern, ty, &scope).then_some(scope),
             None => {
-                // Defaults of a trait: for the types that implement it.
+                // Defaults of a trait apply to the types that implement it.
                 let of = implementation.of.as_ref()?.segments.last()?.ident.clone();
                 let implementors = self.implementations.clone();
                 let implemented = implementors.iter().any(|other| {
@@ -287,8 +287,7 @@ impl Evaluator {
         }
     }
 
-    /// The function of a name that is implemented for a type: inherent ones first, then those of
-    /// traits.
+    /// The function of a name implemented for a type: inherent ones first, then those of traits.
     pub(super) fn find_function(
         &mut self,
         name: Symbol,
@@ -319,7 +318,7 @@ impl Evaluator {
         None
     }
 
-    /// The value of a constant or const parameter of a name, if there is one.
+    /// The value of the constant or const parameter with this name, if any.
     pub(super) fn named_constant(&mut self, ident: &syn::Ident, scope: &Rc<Scope>) -> Result<Option<Value>> {
         let name = self.symbol(ident);
         if let Some(cell) = scope.variable(name) {
@@ -336,7 +335,7 @@ impl Evaluator {
         Ok(None)
     }
 
-    /// A value that the macro does not see: a constant of the language, or an opaque one.
+    /// A value from outside of the macro's input: a constant of the language, or an opaque one.
     pub(super) fn builtin_value(&mut self, builtin: Builtin, path: &syn::ExprPath) -> Value {
         if let Some(value) = methods::constant(self, &builtin) {
             return value;
@@ -348,7 +347,7 @@ impl Evaluator {
             return Value::Opaque(Rc::new(path.to_token_stream()));
         };
         let from_here = builtin.path.len() == 1 || matches!(builtin.path[0].as_str(), "crate" | "super");
-        // A name of the surrounding module: as a value it is more often a constant than a function.
+        // A value of the surrounding module is more often a constant than a function.
         let constant = builtin.owner.is_none()
             && from_here
             && !name.starts_with(char::is_uppercase)
@@ -361,7 +360,8 @@ impl Evaluator {
         Value::Opaque(Rc::new(self.emitted_path(&builtin, path)))
     }
 
-    /// How generated code, which stands in the outermost module, names what the macro does not see.
+    /// The path by which generated code, in the outermost module, refers to an item outside of the
+    /// macro's input.
     pub(super) fn emitted_path(&self, builtin: &Builtin, path: &syn::ExprPath) -> TokenStream {
         if module_path(&self.scope).is_empty() || builtin.owner.is_some() || builtin.path.len() < 2 {
             return path.to_token_stream();
@@ -380,7 +380,7 @@ impl Evaluator {
     }
 }
 
-/// Index of the variant of a name.
+/// The index of a variant by its name.
 pub fn variant_index(definition: &Definition, name: &str) -> Option<usize> {
     definition.variants.iter().position(|variant| variant.name == name)
 }

@@ -1,4 +1,4 @@
-//! Patterns: what they match, and which variables they declare.
+//! Patterns: matching, and the declared variables.
 
 mod compound_patterns;
 
@@ -16,16 +16,16 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use syn::ext::IdentExt;
 
-/// Whether something holds: known, or at run time.
+/// A truth value: known, or a run-time condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Truth {
-    /// Known while the model is compiled.
+    /// Known at compile time.
     Known(bool),
-    /// When the condition holds.
+    /// A run-time condition.
     When(Node),
 }
 
-/// What a pattern is matched against.
+/// The subject of a pattern.
 #[derive(Clone, Debug)]
 pub enum Subject {
     /// A value.
@@ -34,7 +34,7 @@ pub enum Subject {
     Place(Place, bool),
 }
 
-/// Variables that a pattern declares, with their values.
+/// The variables declared by a pattern, with their values.
 pub type Bindings = Vec<(Symbol, Value)>;
 
 impl Evaluator {
@@ -48,7 +48,7 @@ impl Evaluator {
         self.scope = Scope::child_scope(&self.scope, Names::Variables(variables));
     }
 
-    /// Matches a pattern that cannot fail.
+    /// Matches an irrefutable pattern.
     pub(super) fn bind(&mut self, pattern: &syn::Pat, subject: Subject) -> Evaluated<Bindings> {
         let mut bindings = Vec::new();
         let saved = std::mem::replace(&mut self.irrefutable, true);
@@ -71,7 +71,7 @@ impl Evaluator {
         }
     }
 
-    /// Whether a pattern matches, and the variables that it declares.
+    /// Whether a pattern matches, and its variables.
     pub(super) fn matches(
         &mut self,
         pattern: &syn::Pat,
@@ -226,7 +226,7 @@ impl Evaluator {
         Ok(truth)
     }
 
-    /// The first of several patterns that matches.
+    /// The first matching one of several patterns.
     fn match_any(&mut self, or: &syn::PatOr, subject: Subject, bindings: &mut Bindings) -> Evaluated<Truth> {
         let mut some: Option<Node> = None;
         for case in &or.cases {
@@ -261,7 +261,7 @@ impl Evaluator {
         self.truth(&equal, at)
     }
 
-    /// Whether a `bool` holds.
+    /// The truth value of a `bool`.
     pub(super) fn truth(&mut self, value: &Value, at: TokenSpan) -> Evaluated<Truth> {
         match self.follow_value(value.clone(), at)? {
             Value::Bool(value) => Ok(Truth::Known(value)),
@@ -299,7 +299,7 @@ impl Evaluator {
     ) -> Evaluated<Truth> {
         let name = self.symbol(&pattern.ident);
         if pattern.by_ref.is_none() && pattern.mutability.is_none() && pattern.subpat.is_none() {
-            // A constant or a unit struct of that name makes this a comparison.
+            // If a constant or unit struct has this name, the pattern is a comparison.
             let constant = self.pattern_constant(&pattern.ident)?;
             if let Some(constant) = constant {
                 let value = self.subject_value(&subject, pattern)?;
@@ -326,7 +326,7 @@ impl Evaluator {
         Ok(truth)
     }
 
-    /// The constant, unit struct or variant that a plain name in a pattern refers to.
+    /// The constant, unit struct or variant denoted by a plain name in a pattern.
     fn pattern_constant(&mut self, ident: &syn::Ident) -> Evaluated<Option<Value>> {
         if ident == "None" {
             return Ok(Some(Value::Option(None)));
@@ -339,8 +339,8 @@ impl Evaluator {
         Ok(match self.path_meaning(&path)? {
             PathMeaning::Value(Value::Function(_) | Value::Constructor(..)) => None,
             PathMeaning::Value(value) => Some(value),
-            // By convention constants and variants begin with a capital, variables do not. Where a
-            // pattern cannot fail, the compiler would refuse them.
+            // By convention constants and variants start with a capital, variables do not. In
+            // irrefutable patterns the compiler would reject them.
             PathMeaning::Builtin(builtin)
                 if !self.irrefutable && ident.unraw().to_string().starts_with(char::is_uppercase) =>
             {

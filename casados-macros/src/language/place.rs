@@ -1,4 +1,4 @@
-//! Places: variables and parts of them, which assignments and `&mut` refer to.
+//! Places: variables and their parts, the targets of assignments and `&mut`.
 
 use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::{Matrix, Value};
@@ -6,19 +6,19 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use syn::Result;
 
-/// The memory of one variable.
+/// The storage of a variable.
 pub type Cell = Rc<RefCell<Value>>;
 
-/// A variable, or a part of it.
+/// A variable or a part of it.
 #[derive(Clone, Debug)]
 pub struct Place {
     /// The variable.
     pub cell: Cell,
-    /// The way to the part. Slices and blocks come last.
+    /// The projections to the part. Slices and blocks are last.
     pub path: Vec<Projection>,
 }
 
-/// One step on the way from a value to its part.
+/// One projection from a value to a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// A field of a struct or tuple.
@@ -31,26 +31,26 @@ pub enum Projection {
     Element(usize, usize),
     /// A block of a matrix.
     Block {
-        /// First row.
+        /// The first row.
         row: usize,
-        /// First column.
+        /// The first column.
         column: usize,
-        /// Rows.
+        /// The number of rows.
         rows: usize,
-        /// Columns.
+        /// The number of columns.
         columns: usize,
     },
-    /// What is in an `Option`.
+    /// The content of an `Option`.
     Some,
 }
 
 impl Place {
-    /// A new variable.
+    /// The place of a new variable.
     pub fn new(value: Value) -> Place {
         Place { cell: Rc::new(RefCell::new(value)), path: Vec::new() }
     }
 
-    /// Whether both are the same memory.
+    /// Whether both are the same storage.
     pub fn is_same_memory(&self, other: &Place) -> bool {
         Rc::ptr_eq(&self.cell, &other.cell) && self.path == other.path
     }
@@ -148,7 +148,7 @@ impl Evaluator {
         place.set(value).ok_or_else(|| error(at, "the value does not fit where it is assigned to"))
     }
 
-    /// Follows mutable references: the place that a method called on `place` gets.
+    /// Follows mutable references to the place of a method's receiver.
     pub fn follow_place(&mut self, mut place: Place, at: TokenSpan) -> Result<Place> {
         loop {
             match self.read(&place, at)? {
@@ -158,7 +158,7 @@ impl Evaluator {
         }
     }
 
-    /// The value, with mutable references followed.
+    /// Follows mutable references to the value.
     pub fn follow_value(&mut self, mut value: Value, at: TokenSpan) -> Result<Value> {
         while let Value::Reference(place) = &value {
             value = self.read(place, at)?;
@@ -166,8 +166,8 @@ impl Evaluator {
         Ok(value)
     }
 
-    /// A part of a place; its bounds are checked. Slices of slices, and elements of slices and
-    /// blocks, are resolved.
+    /// A part of a place, with bounds checks. Slices of slices, and elements of slices and blocks,
+    /// are resolved.
     pub fn project(&mut self, place: &Place, projection: Projection, at: TokenSpan) -> Result<Place> {
         let mut place = self.follow_place(place.clone(), at)?;
         let value = match place.path.last() {
@@ -228,7 +228,7 @@ impl Evaluator {
         Ok(place)
     }
 
-    /// A part of a value, as [`Evaluator::project`] of a place.
+    /// A part of a value, as [`Evaluator::project`] for a place.
     pub fn value_part(&mut self, value: &Value, projection: Projection, at: TokenSpan) -> Result<Value> {
         match (projection, value) {
             (Projection::Index(index), Value::Array(elements)) => {
@@ -248,7 +248,7 @@ impl Evaluator {
     }
 }
 
-/// Whether references in a value lead to a variable, directly or through other variables.
+/// Whether a value contains references to a variable, directly or through other variables.
 fn refers_to_cell(value: &Value, cell: &Cell) -> bool {
     let any = |values: &[Value]| values.iter().any(|value| refers_to_cell(value, cell));
     match value {

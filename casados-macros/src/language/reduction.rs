@@ -1,10 +1,10 @@
-//! `index_reduction` in the brackets of `#[dae(...)]`: that equations may be differentiated in
-//! time, and how what they say is held.
+//! `index_reduction` among the arguments of `#[dae(...)]`: index reduction, and the stabilisation
+//! of the invariants.
 //!
-//! - `index_reduction`: the constraints' highest derivatives take their place;
-//! - `index_reduction(projection)`: the equations of the projection onto them are written, too;
-//! - `index_reduction(baumgarte = 2.0)`, `index_reduction(baumgarte = [2.0, 1.0])`: what the
-//!   constraints are off by decays with these rates.
+//! - `index_reduction`: each constraint is replaced by its highest derivative;
+//! - `index_reduction(projection)`: also emits the equations of the projection onto the invariants;
+//! - `index_reduction(baumgarte = 2.0)`, `index_reduction(baumgarte = [2.0, 1.0])`: Baumgarte's
+//!   stabilisation, with these decay rates of the constraint errors.
 
 use super::sampling::parse_number;
 use proc_macro2::{Ident, Span};
@@ -12,35 +12,35 @@ use syn::parse::ParseStream;
 use syn::spanned::Spanned;
 use syn::{Error, Expr, Result, Token};
 
-/// What the brackets of `index_reduction` can say.
+/// The possible arguments of `index_reduction`.
 const POSSIBLE: &str = "write `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])` with a decay rate for the \
     constraint and each of its derivatives, `index_reduction(baumgarte = 2.0)` with one rate, or \
     `index_reduction(projection)`";
 
-/// How the index of a model is reduced.
+/// The index reduction of a model.
 #[derive(Clone, Debug)]
 pub struct Reduction {
-    /// Where it is asked for.
+    /// The place of the argument.
     pub span: Span,
-    /// Rates of decay of errors of the constraints; none without stabilisation.
+    /// Decay rates of constraint errors; none without stabilisation.
     pub rates: Rates,
-    /// Whether states are to be projected.
+    /// Whether the projection of states is emitted.
     pub projection: bool,
 }
 
-/// Rates of decay of Baumgarte's stabilisation.
+/// Decay rates of Baumgarte's stabilisation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rates {
-    /// Constraints are not stabilised.
+    /// No stabilisation.
     None,
-    /// One for all derivatives.
+    /// One rate for all derivatives.
     All(f64),
-    /// One for each derivative.
+    /// One rate for each derivative.
     Each(Vec<f64>),
 }
 
 impl Reduction {
-    /// Reads what follows the word.
+    /// Parses the arguments.
     pub fn read(span: Span, input: ParseStream) -> Result<Self> {
         if !input.peek(syn::token::Paren) {
             if !input.is_empty() && !input.peek(Token![,]) {
@@ -71,7 +71,7 @@ impl Reduction {
     }
 }
 
-/// A rate of decay.
+/// A decay rate.
 fn rate(value: &Expr) -> Result<f64> {
     let rate = parse_number(value)?;
     if rate > 0.0 {

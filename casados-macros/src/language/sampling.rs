@@ -1,7 +1,7 @@
-//! Where a model lives: nominal values and ranges of its variables, as the attribute gives them.
+//! Nominal values and ranges of variables, from the attribute.
 //!
 //! - `nominal(x = [0.0, 3.0], u = 10.0)`: a value for each number of an argument, or one for all;
-//! - `range(x = [-1.0..=1.0, 0.0..=6.3], p = 0.5..=2.0)`: likewise an interval.
+//! - `range(x = [-1.0..=1.0, 0.0..=6.3], p = 0.5..=2.0)`: an interval for each, or one for all.
 
 use super::Variables;
 use super::mistakes::CollectedErrors;
@@ -13,12 +13,12 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Error, Expr, Lit, RangeLimits, Result, Token, UnOp};
 
-/// What is known about the values of one variable.
+/// The nominal value and range of a variable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sampling {
     /// A typical value.
     pub nominal: Option<f64>,
-    /// From where to where it may be.
+    /// The range.
     pub range: Option<(f64, f64)>,
 }
 
@@ -30,7 +30,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The kind that a word stands for.
+    /// The kind of a keyword.
     pub fn of(word: &Ident) -> Option<Self> {
         match word.to_string().as_str() {
             "nominal" => Some(Self::Nominal),
@@ -43,7 +43,7 @@ impl Kind {
     }
 }
 
-/// `x = [0.0, 3.0]` in one of the brackets. A nominal value is an interval of one point.
+/// One setting `x = [0.0, 3.0]`. A nominal value is an interval of one point.
 pub(super) struct Setting {
     pub kind: Kind,
     name: Ident,
@@ -60,7 +60,7 @@ enum Values {
 }
 
 impl Setting {
-    /// Reads what stands in the brackets after the word.
+    /// Parses the settings after the keyword.
     pub fn list(kind: Kind, input: ParseStream) -> Result<Vec<Self>> {
         let pair = |input: ParseStream| -> Result<(Ident, Expr)> {
             let name = Ident::parse(input).map_err(|error| {
@@ -99,7 +99,7 @@ impl Setting {
         Ok(Self { kind, name, role, values, span: value.span() })
     }
 
-    /// Whether both say the same thing of the same argument.
+    /// The error if both set the same argument.
     pub fn duplicate_error(&self, other: &Self) -> Option<Error> {
         (self.kind == other.kind && self.role == other.role).then(|| {
             let message = format!("`{}` of `{}` is given twice", self.kind.name(), self.role.name());
@@ -107,13 +107,13 @@ impl Setting {
         })
     }
 
-    /// Where it was written.
+    /// The source position.
     pub fn span(&self) -> Span {
         self.name.span()
     }
 }
 
-/// What the settings say about each of the variables `(ẋ, x, z, u, p, t)`.
+/// The nominal values and ranges of all variables `(ẋ, x, z, u, p, t)`.
 pub(super) fn resolve(settings: &[Setting], variables: &Variables) -> Result<Vec<Sampling>> {
     let Variables { x, z, u, p } = variables;
     let time = [String::from("t")];
@@ -155,7 +155,7 @@ pub(super) fn resolve(settings: &[Setting], variables: &Variables) -> Result<Vec
 }
 
 impl Setting {
-    /// Writes it down for the variables of its argument.
+    /// Applies the setting to the variables of its argument.
     fn apply(&self, names: &[String], samplings: &mut [Sampling]) -> Result<()> {
         let name = self.role.name();
         if names.is_empty() {
@@ -203,7 +203,7 @@ fn interval(kind: Kind, value: &Expr) -> Result<(f64, f64)> {
     }
 }
 
-/// A literal, with a sign or without.
+/// A literal, with or without a sign.
 pub(super) fn parse_number(value: &Expr) -> Result<f64> {
     let literal = match value {
         Expr::Lit(literal) => match &literal.lit {

@@ -1,4 +1,4 @@
-//! `if condition { a } else { b }` on values, where the condition is known at run time only.
+//! `if condition { a } else { b }` for values, with a run-time condition.
 
 use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::{Struct, Value};

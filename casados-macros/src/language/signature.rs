@@ -1,4 +1,4 @@
-//! The signature of a model: its arguments, recognised by name.
+//! The signature of a model: its arguments, identified by name.
 
 use super::Form;
 use super::mistakes::CollectedErrors;
@@ -6,7 +6,7 @@ use proc_macro2::Ident;
 use syn::spanned::Spanned;
 use syn::{Error, FnArg, ItemFn, Pat, Result};
 
-/// What an argument is.
+/// The role of an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// `ẋ`
@@ -21,14 +21,14 @@ pub enum Role {
     P,
     /// Time.
     T,
-    /// Rates of linear controls, of a function.
+    /// Rates of linear controls, in a function.
     Du,
-    /// Integrals, of a function.
+    /// Integrals, in a function.
     Q,
 }
 
 impl Role {
-    /// The role that a name stands for. An argument that is not used may begin with an underscore.
+    /// The role of a name. Unused arguments may start with an underscore.
     pub fn of(name: &Ident) -> Option<Self> {
         let name = name.to_string();
         Some(match name.strip_prefix('_').unwrap_or(&name) {
@@ -59,7 +59,7 @@ impl Role {
 
 /// An argument of a model.
 pub struct Argument {
-    /// What it is.
+    /// The role.
     pub role: Role,
     /// Its type as written.
     pub ty: syn::Type,
@@ -97,7 +97,7 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
     Ok(arguments)
 }
 
-/// One argument, after those before it.
+/// Parses an argument, given the preceding ones.
 fn argument(form: Form, input: &FnArg, before: &[Argument]) -> Result<Argument> {
     let FnArg::Typed(input) = input else {
         return Err(Error::new_spanned(
@@ -113,7 +113,7 @@ fn argument(form: Form, input: &FnArg, before: &[Argument]) -> Result<Argument> 
     Ok(Argument { role, ty: (*input.ty).clone() })
 }
 
-/// What is wrong with a type whatever the items in sight.
+/// Rejects types that are invalid regardless of the items in scope.
 fn check_type(ty: &syn::Type) -> Result<()> {
     let syn::Type::Reference(reference) = ty else { return Ok(()) };
     if reference.mutability.is_some() {
@@ -131,7 +131,7 @@ fn check_type(ty: &syn::Type) -> Result<()> {
     check_type(&reference.elem)
 }
 
-/// The role of an argument, from its name.
+/// The role of an argument, by its name.
 fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let arguments = match form {
         Form::Dae => "`xdot`, `x`, `z`, `u`, `p` and `t`",
@@ -147,7 +147,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             ),
         ));
     };
-    // The other state of a function of two.
+    // The second state of a function of two states.
     if form == Form::Function && identifier.ident.to_string().trim_start_matches('_') == "x0" {
         return Ok(Role::Z);
     }
@@ -183,7 +183,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     }
 }
 
-/// A model is a plain function.
+/// Rejects functions with qualifiers.
 fn check_qualifiers(form: Form, function: &ItemFn) -> Result<()> {
     let sig = &function.sig;
     let plain = "a model is a plain function of numbers";
@@ -203,7 +203,8 @@ fn check_qualifiers(form: Form, function: &ItemFn) -> Result<()> {
     Ok(())
 }
 
-/// Whether a function is a dual model: `fn f<T: DualNum + Copy>(..)`, the bound in either place.
+/// Whether a function is a dual model: `fn f<T: DualNum + Copy>(..)`, with the bound in either
+/// place.
 pub fn is_dual(function: &ItemFn) -> bool {
     let has = |bounds: &syn::punctuated::Punctuated<syn::TypeParamBound, syn::Token![+]>| {
         bounds.iter().any(|bound| {
@@ -226,7 +227,7 @@ pub fn type_name(name: &Ident) -> Ident {
     for word in text.split('_') {
         let mut letters = word.chars();
         if let Some(first) = letters.next() {
-            // Two numbers that an underscore kept apart stay apart.
+            // Two numbers separated by an underscore remain separated.
             if first.is_ascii_digit() && camel.ends_with(|last: char| last.is_ascii_digit()) {
                 camel.push('_');
             }
@@ -234,7 +235,7 @@ pub fn type_name(name: &Ident) -> Ident {
             camel.push_str(letters.as_str());
         }
     }
-    // Scripts without upper case would leave the name of the function.
+    // In scripts without upper case the name would equal that of the function.
     let has_no_case = |first: char| first.is_alphabetic() && !first.is_uppercase() && !first.is_lowercase();
     if !camel.starts_with(|first: char| first.is_alphabetic()) || camel.starts_with(has_no_case) {
         camel.insert(0, 'M');

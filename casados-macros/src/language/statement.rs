@@ -1,4 +1,4 @@
-//! Blocks, `let`, loops, and the macros that are understood.
+//! Blocks, `let`, loops, and the supported macros.
 
 use super::evaluator::{Evaluated, Evaluator, Flow, Target, TokenSpan, error, unsupported};
 use super::methods::{Receiver, iterator};
@@ -11,7 +11,7 @@ use syn::punctuated::Punctuated;
 use syn::{Expr, Stmt, Token};
 
 impl Evaluator {
-    /// A block in a scope of its own.
+    /// Evaluates a block in its own scope.
     pub(super) fn block(&mut self, block: &syn::Block, expected: &Type) -> Evaluated {
         let saved = self.scope.clone();
         let result = self.statements(block, expected);
@@ -111,7 +111,7 @@ impl Evaluator {
         }
     }
 
-    /// Executes the body of a loop once: `Some` if the loop was ended by `break`.
+    /// Executes the body of a loop once: `Some` if `break` ended the loop.
     fn turn(&mut self, label: Option<&String>, body: &syn::Block) -> Evaluated<Option<Value>> {
         let ours = |target: &Option<syn::Lifetime>| match target {
             None => true,
@@ -132,7 +132,7 @@ impl Evaluator {
     pub(super) fn for_loop(&mut self, inner: &syn::ExprForLoop) -> Evaluated {
         let label = inner.label.as_ref().map(|label| label.name.ident.to_string());
         let source = self.expression(&inner.expr, &Type::Unknown)?;
-        // `for x in &mut iterator` leaves the rest of the iterator to those who come later.
+        // `for x in &mut iterator` leaves the rest of the iterator in the variable.
         let shared = match &source {
             Value::Reference(place) => {
                 let place = self.follow_place(place.clone(), &inner.expr)?;
@@ -258,7 +258,7 @@ impl Evaluator {
         }
     }
 
-    /// An assertion of what has to be known; `at` is where it is false.
+    /// An assertion of a known condition; `at` is the position of its error.
     fn check_assertion(
         &mut self,
         call: &syn::Macro,
@@ -273,7 +273,7 @@ impl Evaluator {
         }
     }
 
-    /// `matrix!`, row by row.
+    /// `matrix!`, in row-major order.
     fn matrix_of_rows(&mut self, call: &syn::Macro, rows: &[Vec<Expr>]) -> Evaluated {
         let columns = rows.first().map_or(0, Vec::len);
         if rows.iter().any(|row| row.len() != columns) {
@@ -309,8 +309,8 @@ fn rows_of_matrix(input: ParseStream) -> syn::Result<Vec<Vec<Expr>>> {
     Ok(rows)
 }
 
-/// What the end of a block tells about a variable: `let mut r = zeros(); ...; r` has the type of
-/// the block.
+/// The type of a variable, inferred from the end of a block: in `let mut r = zeros(); ...; r` it is
+/// that of the block.
 fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
     let (syn::Pat::Ident(name), Some(Stmt::Expr(Expr::Path(tail), None))) = (&local.pat, block.stmts.last())
     else {
@@ -329,7 +329,7 @@ fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
 /// The error of a `panic!` without a message.
 const REACHED: &str = "this is reached when the macro evaluates the model";
 
-/// The user's message of an assertion that fails, or one of ours.
+/// The user's message of a failed assertion, or a default one.
 fn assertion_message(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
     match arguments.get(position) {
         Some(Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. })) => text.value(),
@@ -349,7 +349,7 @@ fn runtime_assertion(call: &syn::Macro) -> syn::Error {
     )
 }
 
-/// Whether a pattern has a `ref mut` in it.
+/// Whether a pattern contains `ref mut`.
 fn declares_reference(pattern: &syn::Pat) -> bool {
     use syn::visit::Visit;
     struct Search(bool);

@@ -1,23 +1,23 @@
-//! Items as tokens: what is refused before a parser sees them, and what is changed without one.
+//! Checks and changes of items as tokens, without a parser.
 //!
-//! The user's own tokens are emitted. In groups without delimiters, as `macro_rules!` puts them
-//! around what it was given, the compiler looks no more once a macro has had them in its hands:
-//! `x * $e` would be `x * 1.0 + 2.0`. So those that hold an operation get parentheses.
+//! The user's own tokens are emitted. The compiler ignores groups without delimiters, which
+//! `macro_rules!` puts around its arguments, once a macro has processed them: `x * $e` would become
+//! `x * 1.0 + 2.0`. Groups that contain an operation therefore get parentheses.
 
 use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
-/// Deeper than any model.
+/// Maximum nesting of brackets.
 const MAX_NESTING: usize = 256;
 
-/// Tokens of one statement or element side by side; each may be a level of the syntax tree (prefix
-/// signs, `else if`, calls of methods).
+/// Maximum number of tokens of one statement or element; each may be a level of the syntax tree
+/// (prefix signs, `else if`, method calls).
 const LENGTH: usize = 20_000;
 
-/// Terms of one sum without brackets. The compiler bears twice as many.
+/// Maximum number of terms of a sum without parentheses: half of what the compiler supports.
 const MAX_SUM_TERMS: usize = 4096;
 
-/// Refuses what must not be parsed: tokens that are nested too deeply or too many side by side, and
-/// conditions of the compiler. Does not recurse itself.
+/// Rejects tokens that must not be parsed: too deep nesting, too long statements, and conditional
+/// compilation. Not recursive.
 pub fn check(tokens: &TokenStream) -> syn::Result<()> {
     let mut open = vec![Level::new(tokens)];
     loop {
@@ -46,7 +46,7 @@ pub fn check(tokens: &TokenStream) -> syn::Result<()> {
     }
 }
 
-/// The tokens between two brackets, and how many were looked at.
+/// The tokens between two brackets, and the number of those visited.
 struct Level {
     tokens: Vec<TokenTree>,
     next: usize,
@@ -57,7 +57,7 @@ impl Level {
         Self { tokens: tokens.clone().into_iter().collect(), next: 0 }
     }
 
-    /// Refuses statements and elements that are too long.
+    /// Rejects statements and elements that are too long.
     fn check_length(&self) -> syn::Result<()> {
         let (mut length, mut terms) = (0, 0);
         for token in &self.tokens {
@@ -78,7 +78,7 @@ impl Level {
         Ok(())
     }
 
-    /// Whether `#` or `#!` stands before the token that was taken last.
+    /// Whether `#` or `#!` precedes the last token.
     fn follows_hash(&self) -> bool {
         let before = |back: usize| self.next.checked_sub(back).and_then(|index| self.tokens.get(index));
         match before(2) {
@@ -87,7 +87,7 @@ impl Level {
         }
     }
 
-    /// Whether the attribute that was taken last belongs to a module.
+    /// Whether the last attribute belongs to a module.
     fn is_before_module(&self) -> bool {
         let rest = self.tokens.get(self.next..).unwrap_or_default();
         module_end(rest).is_some()
@@ -120,7 +120,7 @@ fn reject_cfg(attribute: &Group) -> syn::Result<()> {
     }
 }
 
-/// How many of the tokens make a module, with further attributes and visibility, if they begin with
+/// The number of tokens of a module, with further attributes and visibility, if they start with
 /// one.
 fn module_end(tokens: &[TokenTree]) -> Option<usize> {
     let mut index = 0;
@@ -145,18 +145,17 @@ fn module_end(tokens: &[TokenTree]) -> Option<usize> {
     }
 }
 
-/// The item without the modules of its tests, which a model cannot use.
+/// The item without its test modules, which a model cannot use.
 pub fn without_tests(item: TokenStream) -> TokenStream {
     remove_attributes(item, |attribute, rest| if is_test(attribute) { module_end(rest) } else { None })
 }
 
-/// A module without the marks `#[model]` on its functions.
+/// A module without the marks `#[model]` of its functions.
 pub fn without_marks(item: TokenStream) -> TokenStream {
     remove_attributes(item, |attribute, _| (attribute.stream().to_string() == "model").then_some(0))
 }
 
-/// A module without the marks `#[model]` and the attributes of models and functions on its
-/// functions.
+/// A module without the marks `#[model]` and the casados attributes of its functions.
 pub fn without_attributes(item: TokenStream) -> TokenStream {
     remove_attributes(item, |attribute, rest| {
         let path = attribute.stream().into_iter().take_while(|token| !matches!(token, TokenTree::Group(_)));
@@ -166,8 +165,8 @@ pub fn without_attributes(item: TokenStream) -> TokenStream {
     })
 }
 
-/// The item without attributes in its body, and as many tokens behind each as `removed` says; it is
-/// given an attribute and what follows.
+/// The item without attributes in its body, and without as many tokens after each as `removed`
+/// returns for the attribute and its successors.
 fn remove_attributes(
     item: TokenStream,
     removed: impl Fn(&Group, &[TokenTree]) -> Option<usize>,
@@ -189,7 +188,7 @@ fn remove_attributes(
     })
 }
 
-/// The item with something at the beginning of its body, behind inner attributes, and at its end.
+/// The item with tokens inserted at the start of its body, after inner attributes, and at its end.
 pub fn insert_in_body(item: TokenStream, first: &TokenStream, last: &TokenStream) -> TokenStream {
     change_body(item, |tokens| {
         let mut inner = 0;
@@ -205,7 +204,7 @@ pub fn insert_in_body(item: TokenStream, first: &TokenStream, last: &TokenStream
     })
 }
 
-/// Changes what is between the braces at the end of a function or module.
+/// Changes the tokens between the braces at the end of a function or module.
 fn change_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStream) -> TokenStream {
     let mut tokens: Vec<TokenTree> = item.into_iter().collect();
     if let Some(TokenTree::Group(body)) = tokens.last_mut()
@@ -219,7 +218,7 @@ fn change_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStre
     tokens.into_iter().collect()
 }
 
-/// Operations in groups without delimiters get parentheses, at every level.
+/// Adds parentheses to operations in groups without delimiters, at every level.
 fn parenthesise_groups(tokens: TokenStream) -> TokenStream {
     let changed = tokens.into_iter().map(|token| {
         let TokenTree::Group(group) = token else { return token };
@@ -235,7 +234,7 @@ fn parenthesise_groups(tokens: TokenStream) -> TokenStream {
     changed.collect()
 }
 
-/// Whether tokens are an expression whose parts another operator could take.
+/// Whether tokens are an expression that an adjacent operator could split.
 fn is_operation(tokens: TokenStream) -> bool {
     use syn::Expr::{Assign, Binary, Break, Cast, Closure, Range, Reference, Return, Unary};
     matches!(

@@ -1,4 +1,4 @@
-//! Types, as far as they are needed: lengths and shapes flow from them into the values.
+//! Types, as far as they are needed: lengths and shapes, which determine values.
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
@@ -23,11 +23,11 @@ pub enum Type {
     Bool,
     /// A tuple; the empty one is `()`.
     Tuple(Rc<Vec<Type>>),
-    /// An array; of unknown length where it is `_`, or a slice.
+    /// An array; its length is unknown for `_` and slices.
     Array(Rc<Type>, Option<usize>),
     /// A struct or enum of the user with its generic arguments.
     Struct(Rc<Definition>, Rc<Vec<Generic>>),
-    /// A nalgebra matrix or vector, with the rows and columns that are known.
+    /// A nalgebra matrix or vector, with its known numbers of rows and columns.
     Matrix(Option<usize>, Option<usize>),
     /// An `Option`.
     Option(Rc<Type>),
@@ -51,7 +51,7 @@ impl Type {
         }
     }
 
-    /// A number: what operators hand down to their operands.
+    /// The type of a number, which operators pass to their operands.
     pub fn scalar(&self) -> Type {
         match self {
             Type::Real | Type::Integer(_) => self.clone(),
@@ -77,8 +77,8 @@ fn matrix_alias(name: &str) -> Option<(usize, usize)> {
 }
 
 impl Evaluator {
-    /// The type that tokens stand for in a scope. What is not known (type parameters that nothing
-    /// has fixed yet, types from outside, `impl Fn`) is `Unknown`: values bring their own.
+    /// The type of tokens in a scope. Unknown types (unbound type parameters, types from outside,
+    /// `impl Fn`) are `Unknown`: values determine them.
     pub fn resolve(&mut self, ty: &syn::Type, scope: &Rc<Scope>) -> Result<Type> {
         self.resolve_nested(ty, scope, 0)
     }
@@ -113,7 +113,7 @@ impl Evaluator {
         })
     }
 
-    /// The type that a path stands for.
+    /// The type of a path.
     pub fn resolve_path(&mut self, path: &syn::Path, scope: &Rc<Scope>, depth: usize) -> Result<Type> {
         let Some(last) = path.segments.last() else { return Ok(Type::Unknown) };
         if depth > 64 {
@@ -130,7 +130,7 @@ impl Evaluator {
         let place = match self.resolve_module_path(&modules, scope, &mut Vec::new()) {
             PathTarget::Module(module) => module,
             PathTarget::Elsewhere if modules.is_empty() => scope.clone(),
-            // What is in a module that the macro does not see is none of the user's own types.
+            // Types in modules outside of the macro's input are not the user's own.
             PathTarget::Elsewhere => return self.resolve_builtin_type(path, last, &name, scope),
         };
         let mut renamed = None;
@@ -166,7 +166,7 @@ impl Evaluator {
         self.resolve_builtin_type(path, last, &renamed.unwrap_or(name), scope)
     }
 
-    /// The type of a name that is not the user's own: of the language, or of nalgebra.
+    /// The type of a name of the language, or of nalgebra.
     fn resolve_builtin_type(
         &mut self,
         path: &syn::Path,
@@ -220,8 +220,7 @@ impl Evaluator {
         })
     }
 
-    /// The length of an array type; `None` where it is `_` or a parameter that nothing has fixed
-    /// yet.
+    /// The length of an array type; `None` for `_` or an unbound parameter.
     pub(super) fn length(&mut self, length: &syn::Expr, scope: &Rc<Scope>) -> Result<Option<usize>> {
         if matches!(length, syn::Expr::Infer(_)) {
             return Ok(None);
@@ -235,7 +234,7 @@ impl Evaluator {
         }
     }
 
-    /// Generic arguments of a path segment, lifetimes left out.
+    /// The generic arguments of a path segment, without lifetimes.
     pub fn generic_arguments(
         &mut self,
         arguments: &syn::PathArguments,
@@ -247,7 +246,7 @@ impl Evaluator {
         }
     }
 
-    /// Generic arguments, lifetimes left out.
+    /// Generic arguments, without lifetimes.
     pub fn turbofish(
         &mut self,
         arguments: &syn::AngleBracketedGenericArguments,
@@ -257,7 +256,7 @@ impl Evaluator {
         for argument in &arguments.args {
             match argument {
                 syn::GenericArgument::Type(syn::Type::Path(path)) if path.path.get_ident().is_some() => {
-                    // `N` may be a type or a constant: syntax does not tell.
+                    // `N` may be a type or a constant, with the same syntax.
                     let ty = self.resolve_path(&path.path, scope, 0)?;
                     let constant = match (&ty, path.path.get_ident()) {
                         (Type::Unknown, Some(name)) => self.named_constant(name, scope)?,

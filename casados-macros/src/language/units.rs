@@ -1,8 +1,8 @@
-//! Units of variables, from doc comments: what stands behind a comma and is a unit.
+//! Units of variables, from doc comments: the text after a comma, if it is a unit.
 //!
 //! | doc comment | unit |
 //! | --- | --- |
-//! | `/// Position, m.` of a field | `m` of the field and all that is in it |
+//! | `/// Position, m.` of a field | `m` of the field and of everything in it |
 //! | ``/// - `x[1]`: velocity, m/s`` of a model | `m/s` of this variable; of `x` all states |
 //! | ``/// - `t`: s`` of a model | `s` of the time |
 //! | `/// Tension of the tether, N.` of a function | `N` of all outputs |
@@ -10,27 +10,27 @@
 use super::Variables;
 use syn::{Attribute, Expr, ExprLit, Lit, Meta};
 
-/// The unit of each variable, of the time, and of the outputs of a function; empty where none is
-/// known. A list without any unit may be empty.
+/// The units of the variables, of the time, and of the outputs of a function; empty if unknown. A
+/// list without any unit may be empty.
 #[derive(Clone, Debug, Default)]
 pub struct Units {
-    /// Of the differential states.
+    /// The units of the differential states.
     pub x: Vec<String>,
-    /// Of the algebraic states.
+    /// The units of the algebraic states.
     pub z: Vec<String>,
-    /// Of the controls.
+    /// The units of the controls.
     pub u: Vec<String>,
-    /// Of the parameters.
+    /// The units of the parameters.
     pub p: Vec<String>,
-    /// Of the time.
+    /// The unit of the time.
     pub t: String,
-    /// Of all outputs of a function.
+    /// The unit of all outputs of a function.
     pub outputs: String,
 }
 
 impl Units {
-    /// With what a list in the documentation of the model says, and its first sentence about
-    /// outputs.
+    /// Adds the units of the list in the model's documentation, and that of outputs from its first
+    /// paragraph.
     pub fn with_documentation(mut self, documentation: &[Attribute], variables: &Variables) -> Self {
         let lines = lines(documentation);
         self.outputs = of_text(&paragraph(&lines));
@@ -52,7 +52,7 @@ impl Units {
     }
 }
 
-/// The unit that a doc comment says: in its first paragraph what stands behind a comma and is one.
+/// The unit in a doc comment: the text after a comma in its first paragraph, if it is a unit.
 pub fn of_attributes(documentation: &[Attribute]) -> String {
     of_text(&paragraph(&lines(documentation)))
 }
@@ -76,7 +76,7 @@ fn paragraph(lines: &[String]) -> String {
     lines.map(String::as_str).collect::<Vec<_>>().join(" ")
 }
 
-/// A line of a list: a name, a colon, and a unit or a text with one.
+/// A line of a list: a name, a colon, and a unit or a text with a unit.
 fn of_line(line: &str) -> Option<(&str, String)> {
     let item = line.strip_prefix(['-', '*'])?.trim_start();
     let (name, text) = item.split_once(':')?;
@@ -86,7 +86,7 @@ fn of_line(line: &str) -> Option<(&str, String)> {
     (!unit.is_empty()).then_some((name, unit))
 }
 
-/// What stands behind a comma and is a unit.
+/// The text after a comma, if it is a unit.
 fn of_text(text: &str) -> String {
     let parts = text.split(',').skip(1);
     let units = parts.map(|part| {
@@ -98,8 +98,8 @@ fn of_text(text: &str) -> String {
     units.into_iter().find(|unit| is_unit(unit)).unwrap_or_default().to_owned()
 }
 
-/// Whether a name of a list means a variable, as in `casados::ocp`: `x` all states, `x.cart` all
-/// that is in it.
+/// Whether a name of a list denotes a variable, as in `casados::ocp`: `x` all states, `x.cart`
+/// everything in it.
 fn name_matches(name: &str, variable: &str) -> bool {
     let rest = |variable: &str| {
         variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
@@ -108,7 +108,7 @@ fn name_matches(name: &str, variable: &str) -> bool {
     rest(variable) || field.is_some_and(rest)
 }
 
-/// Units with their own names, which take a prefix.
+/// Units with a name that takes a prefix.
 const UNITS_WITH_PREFIX: [&str; 27] = [
     "m", "g", "s", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F", "Ω", "Ohm",
     "S", "Wb", "T", "H", "lm", "L", "bar", "eV",
@@ -126,7 +126,7 @@ fn is_unit(text: &str) -> bool {
     factors.peek().is_some() && text.starts_with(begins) && factors.all(is_power)
 }
 
-/// A unit with an exponent or without.
+/// A unit with or without an exponent.
 fn is_power(factor: &str) -> bool {
     let digits = |c: char| c.is_ascii_digit() || "⁰¹²³⁴⁵⁶⁷⁸⁹⁻".contains(c);
     match factor.split_once('^') {

@@ -1,4 +1,4 @@
-//! Methods and operators that the user implemented.
+//! Methods and operators implemented by the user.
 
 use super::arithmetic::Operator;
 use super::call::Arguments;
@@ -14,7 +14,7 @@ use std::rc::Rc;
 use syn::Result;
 
 impl Evaluator {
-    /// The user's method of a name for a receiver, and the receiver as its first argument.
+    /// The user's method with this name for a receiver, and the receiver as its first argument.
     pub(super) fn user_function(
         &mut self,
         receiver: &Receiver,
@@ -35,7 +35,8 @@ impl Evaluator {
             return Ok(None);
         }
         let hidden = self.is_hidden(&ty, name);
-        // Methods of numbers take `self`, those of matrices `&self`: a trait's `self` comes first.
+        // Methods of numbers take `self`, those of matrices `&self`: a trait's `self` takes
+        // precedence.
         let by_reference = matches!(ty, Type::Matrix(..));
         if hidden && !by_reference {
             return Ok(None);
@@ -50,8 +51,8 @@ impl Evaluator {
         }))
     }
 
-    /// Whether a value has a method of its own of a name that hides those of traits. Where the
-    /// type is a parameter, or `Self` of a trait, there are only those of traits.
+    /// Whether a value has an inherent method of this name, which hides those of traits. If the
+    /// type is a parameter, or `Self` of a trait, only those of traits exist.
     pub(super) fn is_hidden(&self, ty: &Type, name: &str) -> bool {
         let is_generic = |scope: &Rc<Scope>| match &scope.names {
             Names::Types(types) => !types.is_empty(),
@@ -61,7 +62,7 @@ impl Evaluator {
         methods::is_inherent(ty, name) && !self.scope.enclosing_scopes().any(is_generic)
     }
 
-    /// The user's method for a receiver of a type.
+    /// The user's method for a receiver of this type.
     fn trait_function(
         &mut self,
         receiver: &Receiver,
@@ -100,9 +101,9 @@ impl Evaluator {
         self.trait_function(receiver, (ty, symbol), &builtin.turbofish, at)
     }
 
-    /// The implementations of a generic trait for one type, of which the arguments of a call choose
-    /// one: `impl From<A> for X` and `impl From<B> for X`. Only the function itself if it is not of
-    /// such a trait.
+    /// The implementations of a generic trait for one type, of which the arguments of a call select
+    /// one: `impl From<A> for X` and `impl From<B> for X`. Only the function itself if the trait is
+    /// not generic.
     pub(super) fn implementations_of_trait(&mut self, function: &Function) -> Vec<Function> {
         let Some((implementation, ty)) = &function.owner else { return Vec::new() };
         let generic = |implementation: &Implementation| {
@@ -128,7 +129,7 @@ impl Evaluator {
         several
     }
 
-    /// Of several functions the only one that takes these arguments.
+    /// The only one of several functions that takes these arguments.
     pub(super) fn choose(
         &mut self,
         several: Vec<Function>,
@@ -150,7 +151,7 @@ impl Evaluator {
         }
     }
 
-    /// Whether the types of arguments are those of a function, as far as they are known.
+    /// Whether the types of arguments match a function, as far as they are known.
     fn takes(&mut self, function: &Function, arguments: &[Value]) -> bool {
         let Some((implementation, ty)) = &function.owner else { return false };
         let Some(scope) = self.matching_impl_scope(implementation, ty) else { return false };
@@ -166,8 +167,7 @@ impl Evaluator {
             })
     }
 
-    /// What `into` makes by the user's `From`, if there is one for the value and the type that is
-    /// expected.
+    /// The result of `into` by the user's `From`, if it exists for the value and the expected type.
     pub(super) fn user_conversion(
         &mut self,
         receiver: &Receiver,
@@ -219,7 +219,7 @@ impl Evaluator {
     }
 
     /// A method of a trait (or an inherent one of the same name) that the user implemented for `a`;
-    /// of several implementations the one whose generic argument fits the first of the other
+    /// of several implementations the one whose generic argument matches the first of the other
     /// arguments.
     pub(super) fn user_method(
         &mut self,

@@ -1,8 +1,7 @@
-//! What expressions evaluate to while the body of a model is executed symbolically.
+//! The values of expressions in the symbolic execution of a model.
 //!
-//! Values are cheap to clone: aggregates are shared and copied when one of the owners writes to
-//! them. Shared references are transparent: `&a` is the value of `a`. Only `&mut` is a value of its
-//! own.
+//! Values are cheap to clone: aggregates are shared, and copied when an owner changes them. Shared
+//! references are transparent: `&a` is the value of `a`. Only `&mut` is a separate value.
 
 use super::environment::Scope;
 use super::implementation::Implementation;
@@ -17,13 +16,13 @@ use std::rc::{Rc, Weak};
 /// The value of an expression.
 #[derive(Clone, Debug)]
 pub enum Value {
-    /// A variable that is declared and not assigned yet.
+    /// A variable that is declared, but not assigned.
     Uninitialised,
     /// An `f64`.
     Real(Node),
     /// An integer, always known.
     Integer(Integer),
-    /// A `bool` that is known.
+    /// A known `bool`.
     Bool(bool),
     /// A `bool` that depends on model variables.
     Condition(Node),
@@ -31,7 +30,7 @@ pub enum Value {
     Tuple(Rc<Vec<Value>>),
     /// An array or a slice.
     Array(Rc<Vec<Value>>),
-    /// A struct, or a variant of an enum, that the macro sees the definition of.
+    /// A struct, or a variant of an enum, with its definition in the macro's input.
     Struct(Rc<Struct>),
     /// `a..b` and its relatives.
     Range(Rc<Range>),
@@ -39,7 +38,7 @@ pub enum Value {
     Iterator(Box<Iter>),
     /// A closure with its environment.
     Closure(Rc<Closure>),
-    /// A function that the macro sees.
+    /// A function in the macro's input.
     Function(Rc<Function>),
     /// A function or method of the language named by path: `f64::sqrt`.
     Builtin(Rc<Builtin>),
@@ -49,12 +48,11 @@ pub enum Value {
     Reference(Place),
     /// A nalgebra matrix or vector.
     Matrix(Rc<Matrix>),
-    /// An `Option`, known to be there or not.
+    /// An `Option`, known to be `Some` or `None`.
     Option(Option<Box<Value>>),
     /// A table of `casados::tables`.
     Table(Rc<Interpolation>),
-    /// A constant that is defined where the macro does not see it. It becomes a number when it is
-    /// used as one.
+    /// A constant defined outside of the macro's input. It becomes a number when used as one.
     Opaque(Rc<TokenStream>),
 }
 
@@ -79,7 +77,7 @@ impl Value {
         Value::Integer(Integer { value: value as i128, ty: Some(IntegerType::Usize) })
     }
 
-    /// A matrix, column after column.
+    /// A matrix, in column-major order.
     pub fn matrix(rows: usize, columns: usize, elements: Vec<Value>) -> Value {
         Value::Matrix(Rc::new(Matrix { rows, columns, elements }))
     }
@@ -94,7 +92,7 @@ impl Value {
         Value::Option(Some(Box::new(value)))
     }
 
-    /// What it is, for errors: "an integer".
+    /// A description for errors: "an integer".
     pub fn description(&self) -> &'static str {
         match self {
             Value::Uninitialised => "a variable without a value",
@@ -119,7 +117,7 @@ impl Value {
     }
 }
 
-/// An integer and its type, where it is known (literals get theirs from what they meet).
+/// An integer and its type, if known (literals get it from their context).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integer {
     /// The value, within the range of the type.
@@ -237,12 +235,12 @@ pub struct Definition {
     pub variants: Vec<Variant>,
     /// Generic parameters.
     pub generics: syn::Generics,
-    /// Where it stands: what its field types refer to. The evaluator keeps it alive.
+    /// The enclosing scope, in which its field types are resolved. The evaluator keeps it alive.
     pub scope: OnceCell<Weak<Scope>>,
 }
 
 impl Definition {
-    /// Where it stands.
+    /// The enclosing scope.
     pub fn scope(&self) -> Rc<Scope> {
         self.scope.get().and_then(Weak::upgrade).unwrap_or_default()
     }
@@ -251,19 +249,19 @@ impl Definition {
 /// A variant of an enum, or the fields of a struct.
 #[derive(Debug)]
 pub struct Variant {
-    /// Name of the variant; that of the struct.
+    /// The name of the variant, or of the struct.
     pub name: String,
-    /// Names (`0`, `1` for tuple structs) and types.
+    /// Names (`0`, `1` for tuple structs) and types of the fields.
     pub fields: Vec<(String, syn::Type)>,
-    /// The unit of each field that its documentation says, or an empty text.
+    /// The unit of each field from its documentation, or an empty text.
     pub units: Vec<String>,
-    /// What the constructor looks like.
+    /// The form of the constructor.
     pub style: Style,
     /// `= 3` of an enum.
     pub discriminant: Option<syn::Expr>,
 }
 
-/// How a struct is written.
+/// The form of a struct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// `S { a: f64 }`
@@ -281,53 +279,53 @@ pub struct Interpolation {
     pub name: &'static str,
     /// The number of its variables.
     pub variables: usize,
-    /// Derivatives of higher order by one variable are zero.
+    /// Derivatives of higher order with respect to one variable are zero.
     pub degree: u8,
-    /// The call that makes it.
+    /// The call of its constructor.
     pub expression: TokenStream,
 }
 
 /// `start..end`, `start..=end` and their relatives.
 #[derive(Clone, Debug)]
 pub struct Range {
-    /// The first.
+    /// The start.
     pub start: Option<Value>,
     /// The end.
     pub end: Option<Value>,
-    /// Whether the end belongs to it.
+    /// Whether the end is included.
     pub inclusive: bool,
 }
 
-/// A closure and the scope in which it was written (or the copies that it took with it).
+/// A closure and its scope (or the captured copies).
 #[derive(Debug)]
 pub struct Closure {
     /// As written.
     pub closure: Rc<syn::ExprClosure>,
-    /// What it sees.
+    /// Its scope.
     pub scope: Rc<Scope>,
-    /// The functions that were being executed where it was written.
+    /// The functions in execution at its definition.
     pub calls: Option<Rc<CallStack>>,
 }
 
-/// The functions that are being executed, innermost first.
+/// The functions in execution, innermost first.
 #[derive(Debug)]
 pub struct CallStack {
-    /// This one.
+    /// The innermost function.
     pub function: Rc<syn::ItemFn>,
-    /// Those that called it.
+    /// Its callers.
     pub parent: Option<Rc<CallStack>>,
 }
 
-/// A function that the macro sees.
+/// A function in the macro's input.
 #[derive(Debug)]
 pub struct Function {
     /// Signature and body.
     pub item: Rc<syn::ItemFn>,
-    /// Where it stands.
+    /// The enclosing scope.
     pub scope: Rc<Scope>,
-    /// Generic arguments that were given.
+    /// The explicit generic arguments.
     pub turbofish: Vec<Generic>,
-    /// The `impl` block it belongs to, and the type it was named by.
+    /// The `impl` block of the function, and the type by which it was named.
     pub owner: Option<(Rc<Implementation>, Type)>,
 }
 

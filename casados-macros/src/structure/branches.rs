@@ -1,23 +1,23 @@
-//! Where a model is not smooth: numbers that change where a condition or the piece of a table does.
+//! Discontinuities of a model: numbers that change with a condition or the piece of a table.
 
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 
-/// Conditions count as powers of two; so many have one of their own. Sums of them are exact in
-/// single precision up to sixteen times as many.
+/// The number of conditions with a weight of their own, a power of two. Sums of weights are exact
+/// in single precision up to sixteen times as many.
 const MAX_CONDITION_WEIGHTS: usize = 20;
 
-/// What a model's equations depend on that changes where they are not smooth.
+/// The discontinuities of a model's equations.
 pub struct BranchIndicators {
-    /// How many conditions and tables there are.
+    /// The number of conditions and tables.
     pub count: usize,
-    /// `Σ 2ⁱ` over the conditions that hold, and the pieces of linear tables.
+    /// `Σ 2ⁱ` over the conditions that hold, plus the pieces of linear tables.
     pub kinks: Node,
     /// The pieces of splines.
     pub knots: Node,
 }
 
-/// The conditions of comparisons, of the signs in `abs` and `signum`, and tables, as far as they
-/// may change within an interval: `is_constant` says which variables do not.
+/// Finds the conditions of comparisons, of the signs in `abs` and `signum`, and the tables that may
+/// change within an interval: `is_constant` tells which variables do not.
 pub fn find(
     graph: &mut Graph,
     residual: &[Node],
@@ -59,7 +59,7 @@ pub fn find(
     })
 }
 
-/// Those that depend on what changes, each once.
+/// The nodes that depend on varying variables, each once.
 fn time_varying_nodes(graph: &Graph, mut nodes: Vec<Node>, is_constant: impl Fn(u32) -> bool) -> Vec<Node> {
     nodes.sort_unstable();
     nodes.dedup();

@@ -1,15 +1,15 @@
-//! The elimination order of the Newton matrix, found before the program runs.
+//! The elimination order of the Newton matrix, chosen at compile time.
 //!
 //! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of
-//! `f_ẋ ∪ f_x ∪ f_z`, with s×s blocks as entries. Where the stages share one Jacobian, block
+//! `f_ẋ ∪ f_x ∪ f_z`, with s×s blocks as entries. If the stages share one Jacobian, block
 //! elimination decouples in the eigenbasis of A: it is the scalar elimination of `f_ẋ + hμ f_x` for
-//! every eigenvalue `μ` of A. So pivots are judged on such complex matrices, at many points of the
-//! model and many `hμ` at once: a pivot is taken only if it is acceptable at all of them. Among the
+//! every eigenvalue `μ` of A. Pivots are therefore tested on such complex matrices, at many points
+//! of the model and many values of `hμ`: a pivot has to be acceptable at all of them. Among the
 //! acceptable ones the Markowitz cost decides.
 //!
-//! One of the points is at rest: all states are zero. Models are started there, and entries that
-//! vanish there (the sine of an angle) are no pivots. Of some models the matrix itself is singular
-//! there: then this point has no say in the columns that vanish.
+//! One of the points is at rest: all states are zero. Models often start there, and entries that
+//! vanish there (the sine of an angle) must not be pivots. If the matrix itself is singular at
+//! rest, this point is ignored for the columns that vanish.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
@@ -20,24 +20,25 @@ pub struct Entry {
     pub row: u32,
     pub column: u32,
     pub values: Vec<Complex>,
-    /// The block is a constant multiple of the identity, so that it costs nothing as a pivot.
+    /// Whether the block is a constant multiple of the identity, a pivot without cost.
     pub trivial: bool,
 }
 
-/// Where the elimination puts what: the tables of `casados_core::model::Elimination`.
+/// The positions of the elimination: the tables of `casados_core::model::Elimination`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
-    /// Row and column of each pivot, in order.
+    /// The row and column of each pivot, in order.
     pub pivots: Vec<(u32, u32)>,
-    /// Where the blocks of each pivot begin: the pivot itself (`L` follows it), `U`, and the end.
+    /// The offsets of the blocks of each pivot: the pivot itself (`L` follows it), `U`, and the
+    /// end.
     pub ranges: Vec<[u32; 3]>,
-    /// Row and column of each block of the factors, fill included.
+    /// The row and column of each block of the factors, fill included.
     pub blocks: Vec<(u32, u32)>,
     /// For every pivot, for every block of `L`, for every block of `U`: the block that is updated.
     pub updates: Vec<u32>,
 }
 
-/// A complex number, as the samples need it.
+/// A complex number of the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Complex {
     pub re: f64,
@@ -60,27 +61,27 @@ impl Complex {
     }
 }
 
-/// A pivot is acceptable if at every sample it is at least this fraction of the largest entry of
-/// its column (rows scaled to a largest entry of one).
+/// Pivot thresholds: a pivot is acceptable if at every sample it is at least this fraction of the
+/// largest entry of its column (rows scaled to a largest entry of one).
 const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
 
-/// Where all entries of a column are smaller than this at rest, rows scaled to a largest entry of
-/// one, the matrix is singular there.
+/// A column vanishes at rest if all its entries are below this, with rows scaled to a largest entry
+/// of one: the matrix is singular there.
 const VANISHING: f64 = 1e-10;
 
 /// The matrix during elimination.
 struct ActiveMatrix {
-    /// By row, by column: values at the samples, and whether the block is trivial.
+    /// By row, by column: the values at the samples, and whether the block is trivial.
     rows: Vec<BTreeMap<u32, (Vec<Complex>, bool)>>,
-    /// Rows that have an entry in the column.
+    /// The rows with an entry in each column.
     columns: Vec<Vec<u32>>,
     done_rows: Vec<bool>,
     done_columns: Vec<bool>,
-    /// 1 / largest entry of each row at each sample, at the beginning.
+    /// 1 / largest entry of each row at each sample, at the start.
     scales: Vec<Vec<f64>>,
-    /// How many pivots, one after the other, each row has had to wait for.
+    /// The length of the chain of pivots on which each row depends.
     depths: Vec<u32>,
-    /// Samples from this one on are at rest.
+    /// The index of the first sample at rest.
     at_rest: usize,
 }
 
@@ -109,7 +110,7 @@ impl ActiveMatrix {
         active
     }
 
-    /// The worst ratio over the samples of an entry to the largest of its column.
+    /// The smallest ratio over the samples of an entry to the largest one of its column.
     fn quality(&self, row: usize, column: u32) -> f64 {
         let (values, _) = &self.rows[row][&column];
         let mut worst = f64::INFINITY;
@@ -132,9 +133,9 @@ impl ActiveMatrix {
         worst
     }
 
-    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the one that
-    /// waits for the fewest others (pivots that do not depend on each other overlap in the
-    /// processor), then the first in order.
+    /// The cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the
+    /// shortest chain of dependences (independent pivots overlap in the processor), then the first
+    /// in order.
     fn choose(&self) -> Option<(u32, u32)> {
         let mut candidates: Vec<(u64, bool, u32, u32, u32)> = Vec::new();
         for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.done_rows[*row]) {
@@ -145,7 +146,7 @@ impl ActiveMatrix {
         }
         candidates.sort_unstable();
         for threshold in THRESHOLDS {
-            // Any pivot that is merely not zero, if nothing better is left: the best of them.
+            // At the last threshold every non-zero pivot is acceptable: the best one.
             if threshold == 0.0 {
                 return candidates
                     .iter()
@@ -161,7 +162,7 @@ impl ActiveMatrix {
         None
     }
 
-    /// Eliminates with a pivot; gives the rows of its column (L) and the columns of its row (U).
+    /// Eliminates with a pivot; returns the rows of its column (L) and the columns of its row (U).
     fn eliminate(&mut self, row: u32, column: u32) -> (Vec<u32>, Vec<u32>) {
         let pivot_row = std::mem::take(&mut self.rows[row as usize]);
         let pivot = pivot_row[&column].0.clone();
@@ -196,13 +197,12 @@ impl ActiveMatrix {
     }
 }
 
-/// A plan has no more updates than this; each is an element of a table. A full matrix of 66
-/// equations has as many. Beyond it there is none, and the engine eliminates the whole matrix with
-/// pivots that it looks for.
+/// Maximum number of updates of a plan, the size of a table; a full matrix of 66 equations has as
+/// many. Larger models have no plan, and the engine factorises the whole matrix with pivoting.
 const MAX_UPDATES: usize = 100_000;
 
-/// The plan for a matrix of `size` equations and unknowns, whose last samples are those `at_rest`;
-/// an empty one where it would be too long.
+/// The plan for a matrix of `size` equations and unknowns, whose last `at_rest` samples are at
+/// rest; empty if it would be too long.
 pub fn plan(size: usize, entries: &[Entry], at_rest: usize) -> Plan {
     let mut active = ActiveMatrix::new(size, entries, at_rest);
     let mut steps = Vec::with_capacity(size);
@@ -222,9 +222,9 @@ pub fn plan(size: usize, entries: &[Entry], at_rest: usize) -> Plan {
 
 type Step = (u32, u32, Vec<u32>, Vec<u32>);
 
-/// Rows of every step in the order in which they are eliminated: what the next pivot waits for is
-/// updated first. Columns in the opposite order: on the way back what was found last is met last,
-/// and the rest of the sum does not wait for it.
+/// Sorts the rows of every step by their order of elimination, so that the next pivot is updated
+/// first, and the columns in the opposite order, so that in the back substitution the last computed
+/// unknown comes last and does not delay the rest of the sum.
 fn sort_rows(steps: &mut [Step]) {
     let rows: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.0, k)).collect();
     let columns: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.1, k)).collect();
@@ -234,7 +234,7 @@ fn sort_rows(steps: &mut [Step]) {
     }
 }
 
-/// Numbers the blocks pivot by pivot, and looks up every update.
+/// Numbers the blocks pivot by pivot, and finds the block of every update.
 fn number_blocks(steps: &[Step]) -> Plan {
     let mut plan = Plan::default();
     for (row, column, lower, upper) in steps {
@@ -264,7 +264,7 @@ mod tests {
         Entry { row, column, values, trivial: false }
     }
 
-    /// `P A Q = (I + L)(P + U)` at the first sample, by the tables of the plan.
+    /// The residual of `P A Q = (I + L)(P + U)` at the first sample, by the tables of the plan.
     fn reconstruction_error(size: usize, entries: &[Entry], plan: &Plan) -> f64 {
         let mut blocks: HashMap<(u32, u32), f64> = plan.blocks.iter().map(|&at| (at, 0.0)).collect();
         for entry in entries {
@@ -284,7 +284,7 @@ mod tests {
             }
         }
         assert_eq!(updates.next(), None);
-        // A solution for A · 1, by the factors.
+        // The solution of A x = A · 1, by the factors.
         let mut b = vec![0.0; size];
         entries.iter().for_each(|entry| b[entry.row as usize] += entry.values[0].re);
         for (&(row, _), &[begin, upper, _]) in plan.pivots.iter().zip(&plan.ranges) {
@@ -307,8 +307,8 @@ mod tests {
 
     #[test]
     fn factors_by_the_plan_solve_the_system() {
-        // A band of width five with a full last row and column, diagonally dominant: of condition
-        // about ten.
+        // A band of width five with a full last row and column, diagonally dominant: its condition
+        // number is about ten.
         let n = 30u32;
         let mut entries = Vec::new();
         for r in 0..n {
@@ -321,13 +321,13 @@ mod tests {
         }
         let plan = plan(n as usize, &entries, 0);
         assert!(reconstruction_error(n as usize, &entries, &plan) < 1e-13);
-        // The full row and column go last, so that there is hardly any fill.
+        // The full row and column are last, so that there is hardly any fill.
         assert!(plan.blocks.len() <= entries.len() + 2, "{} of {}", plan.blocks.len(), entries.len());
     }
 
     #[test]
     fn a_pivot_that_vanishes_at_one_sample_is_not_taken() {
-        // By cost alone (0, 0) or (1, 1) are as good as any; each vanishes at one of the samples.
+        // By cost alone (0, 0) and (1, 1) are equal; each vanishes at one of the samples.
         let entries = [
             entry(0, 0, &[0.0, 1.0, 1.0]),
             entry(0, 1, &[1.0, 1.0, 1.0]),
@@ -338,7 +338,7 @@ mod tests {
         assert!(matches!(plan.pivots[0], (0, 1) | (1, 0)), "{:?}", plan.pivots);
     }
 
-    /// `[[sin x, cos x], [−1, 1]]`-like: of the samples the last is at rest.
+    /// A matrix like `[[sin x, cos x], [−1, 1]]`: the last sample is at rest.
     #[test]
     fn a_pivot_that_vanishes_at_rest_is_not_taken() {
         let moving = [
@@ -354,7 +354,7 @@ mod tests {
             entry(1, 1, &[0.6, 0.9, 1.0]),
         ];
         assert_ne!(plan(2, &entries, 1).pivots[0], (0, 0));
-        // A matrix that is singular there has the plan that it has without.
+        // If the matrix is singular at rest, the plan is that without this sample.
         let singular = [
             entry(0, 0, &[0.8, 0.5, 0.0]),
             entry(0, 1, &[0.6, 0.9, 0.0]),

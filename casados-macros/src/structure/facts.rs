@@ -1,5 +1,4 @@
-//! Facts that let the engine leave work out: what influences nobody, what never changes, what is
-//! straight.
+//! Facts that let the engine skip work: unused, constant and linear entries.
 
 use crate::graph::{Degree, Entry, Graph, Node};
 use std::collections::BTreeSet;
@@ -9,7 +8,7 @@ use std::collections::BTreeSet;
 pub struct Facts {
     /// The entries of `f_ẋ, f_x, f_z` do not depend on `(ẋ, x, z)`.
     pub linear_in_state: bool,
-    /// Nor on `t`.
+    /// Nor do they depend on `t`.
     pub constant_matrix: bool,
     /// Nothing depends on `t`.
     pub autonomous: bool,
@@ -17,18 +16,19 @@ pub struct Facts {
     pub constant_rows: Vec<bool>,
     /// Equations `c ẋ_j + c′ v + c″(t) = 0`.
     pub trivial: Vec<u32>,
-    /// States that influence nobody.
+    /// States on which no equation depends.
     pub quadratures: Vec<u32>,
-    /// Directions `(x₀, u, p)` that an equation depends on.
+    /// Directions `(x₀, u, p)` on which an equation depends.
     pub directions: Vec<u32>,
-    /// Variables that occur in the Hessian, but for those of the next.
+    /// Nonlinear variables: those in the Hessian, except those of the next list.
     pub curved: Vec<u32>,
-    /// Diagonal entries that belong to a control or a parameter alone: the entry, and the
+    /// Diagonal entries of a control or a parameter without other entries: the entry, and the
     /// direction.
     pub diagonal_controls: Vec<(u32, u32)>,
 }
 
-/// Reads the facts off the derivatives. `ends` is where `ẋ, x, z, u, p` end among the variables.
+/// Derives the facts from the derivatives. `ends` are the ends of `ẋ, x, z, u, p` among the
+/// variables.
 pub fn find(
     graph: &Graph,
     residual: &[Node],
@@ -54,7 +54,7 @@ pub fn find(
         linear[row as usize] && derivatives == 1 && others <= 1 && constant
     };
     let used: BTreeSet<u32> = jacobian.iter().map(|entry| entry.1).collect();
-    // Directions are (x, u, p): the variables from x on, less z.
+    // Directions are (x, u, p): the variables from x on, without z.
     let direction = |&variable: &u32| {
         let outside = (nx..end_x).contains(&variable) || variable >= end_z;
         outside.then(|| if variable < end_x { variable - nx } else { variable - end_z + nx })
@@ -77,7 +77,7 @@ pub fn find(
     }
 }
 
-/// What second derivatives are made of.
+/// The variables with second derivatives.
 struct NonlinearVariables {
     variables: BTreeSet<u32>,
     diagonal_controls: Vec<(u32, u32)>,
@@ -87,7 +87,7 @@ impl NonlinearVariables {
     fn find(hessian: &[Entry], ends: [u32; 5]) -> Self {
         let [nx, end_x, end_z, ..] = ends;
         let mut variables: BTreeSet<u32> = hessian.iter().flat_map(|entry| [entry.0, entry.1]).collect();
-        // The entry on the diagonal, if there is no other one.
+        // The diagonal entry, if it is the only one.
         let alone = |variable: u32| {
             let mut own = (0..).zip(hessian).filter(|(_, e)| e.0 == variable || e.1 == variable);
             let (index, entry) = own.next()?;

@@ -1,20 +1,20 @@
-//! The structural index: is there a matching of equations to unknowns `(ẋ, z)`?
+//! The structural index: a matching of equations to unknowns `(ẋ, z)`.
 
 use crate::graph::Entry;
 use crate::language::Model;
 
-/// What is said of equations and unknowns that do not match.
+/// The wording of errors about equations and unknowns without a matching.
 pub struct Words<'a> {
     /// The name of an unknown.
     pub name: &'a dyn Fn(usize) -> String,
-    /// What an equation without unknowns does not contain.
+    /// What an equation without unknowns lacks.
     pub nothing: &'a str,
-    /// What that means, and the way out.
+    /// The conclusion, and the remedy.
     pub conclusion: &'a str,
 }
 
-/// An error if no matching of equations to unknowns exists in the pattern of `(f_ẋ, f_z)`: then
-/// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1.
+/// Returns an error if no matching of equations to unknowns exists in the pattern of `(f_ẋ, f_z)`:
+/// then `∂f/∂(ẋ, z)` is singular for all values, and the index of the model is not 1.
 pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<()> {
     let nx = ends[0];
     let mut rows = vec![Vec::new(); model.residual.len()];
@@ -41,8 +41,8 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
     matching(model, &rows, &Words { name: &name, nothing, conclusion: &conclusion })
 }
 
-/// An error if no matching of equations to unknowns exists in the pattern `rows`. Names what is
-/// over- and underdetermined (the Dulmage-Mendelsohn decomposition).
+/// Returns an error if no matching of equations to unknowns exists in the pattern `rows`. It names
+/// the over- and underdetermined parts (the Dulmage-Mendelsohn decomposition).
 pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Result<()> {
     let count = rows.len();
     let matching = maximum_matching(rows, count);
@@ -82,7 +82,7 @@ pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Resul
         sentences.push(format!("{} {verb} determined {object}", listed_names(unknowns, name)));
     }
     let message = format!("{}: {} (equations are counted from 0)", sentences.join("; "), words.conclusion);
-    // At every equation concerned; several that come from the same tokens are one.
+    // At every affected equation; several from the same tokens count as one.
     let concerned = |part: usize| parts[part].iter().flat_map(move |(a, b)| if part == 0 { a } else { b });
     let mut seen = Vec::new();
     let mut error: Option<syn::Error> = None;
@@ -101,12 +101,11 @@ pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Resul
     Err(error.unwrap_or_else(|| syn::Error::new(model.name.span(), &message)))
 }
 
-/// For each column the row that it is matched with: a matching of maximum size, by augmenting
-/// paths.
+/// For each column the row matched with it: a maximum matching, by augmenting paths.
 fn maximum_matching(rows: &[Vec<usize>], columns: usize) -> Vec<Option<usize>> {
     let mut matching: Vec<Option<usize>> = vec![None; columns];
     for start in 0..rows.len() {
-        // Breadth first; each column remembers the row from which it was reached.
+        // Breadth first; each column stores the row from which it was reached.
         let mut from: Vec<Option<usize>> = vec![None; columns];
         let mut of_row: Vec<Option<usize>> = vec![None; rows.len()];
         let mut queue = std::collections::VecDeque::from([start]);
@@ -153,7 +152,7 @@ fn unmatched(map: &[Option<usize>]) -> Vec<usize> {
     (0..map.len()).filter(|&index| map[index].is_none()).collect()
 }
 
-/// What is reached from unmatched vertices along alternating paths, as connected components: the
+/// The vertices reached from unmatched ones along alternating paths, as connected components: the
 /// vertices of their side and those of the other side, ascending.
 fn components(
     neighbours: &[Vec<usize>],
@@ -210,7 +209,7 @@ fn count_phrase<'a>(one: &str, many: &str, items: &'a [usize], name: impl Fn(&'a
     format!("{} {}", if items.len() == 1 { one } else { many }, listed_names(items, name))
 }
 
-/// `a`, `a and b`, `a, b and c`; of many the first ones and their number.
+/// `a`, `a and b`, `a, b and c`; of many names the first ones and their number.
 fn listed_names<'a>(items: &'a [usize], name: impl Fn(&'a usize) -> String) -> String {
     const MAX_SHOWN: usize = 8;
     let mut names: Vec<String> = items.iter().take(MAX_SHOWN).map(name).collect();

@@ -1,6 +1,6 @@
 //! Kinematic states: `q` with an equation `q̇ − c v = 0`, where `v` is a state that is not
 //! kinematic itself, a control or a parameter. Their derivatives follow from those of `v` at every
-//! stage, so that they are no unknowns of the elimination: `casados_core::model::Kinematic`.
+//! stage, so that the elimination condenses them: `casados_core::model::Kinematic`.
 
 use super::Model;
 use super::samples::{NewtonEntry, Term};
@@ -22,7 +22,7 @@ pub struct Kinematic {
     pub dependents: Vec<u32>,
 }
 
-/// The kinematic states, ascending: as many as there can be.
+/// The kinematic states, ascending: a maximum set.
 pub fn find(model: &Model, (jacobian, blocks): (&[Entry], [usize; 6]), trivial: &[u32]) -> Vec<Kinematic> {
     let nx = model.variables.x.len() as u32;
     let mut candidates: BTreeMap<u32, Kinematic> = BTreeMap::new();
@@ -47,8 +47,8 @@ pub fn find(model: &Model, (jacobian, blocks): (&[Entry], [usize; 6]), trivial: 
 }
 
 /// A largest set of candidates of which none is the velocity of another. Each has one velocity, so
-/// that they are a forest but for cycles: who is no velocity of a candidate that is left is taken,
-/// and its velocity is not.
+/// that they are a forest except for cycles: a candidate that is no velocity of another is
+/// selected, and its velocity is removed.
 fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinematic> {
     let mut taken = BTreeMap::new();
     while let Some(&first) = candidates.keys().next() {
@@ -56,7 +56,7 @@ fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinemat
         let state = candidates.keys().copied().find(|state| !is_velocity(state)).unwrap_or(first);
         if let Some(kinematic) = candidates.remove(&state) {
             candidates.remove(&kinematic.velocity.wrapping_sub(nx));
-            // In a cycle it is a velocity, too.
+            // In a cycle every candidate is a velocity.
             candidates.retain(|_, other| other.velocity != nx + state);
             taken.insert(state, kinematic);
         }
@@ -64,8 +64,8 @@ fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinemat
     taken.into_values().collect()
 }
 
-/// The Newton matrix without the equations and the derivatives of kinematic states: of `k_q = c
-/// (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is a part of that of `v`.
+/// The Newton matrix without the equations and the derivatives of kinematic states: by
+/// `k_q = c (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is added to that of `v`.
 pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<NewtonEntry>) -> Vec<NewtonEntry> {
     let mut left: BTreeMap<(u32, u32), NewtonEntry> = BTreeMap::new();
     for NewtonEntry { row, column, terms } in positions {
@@ -87,13 +87,13 @@ pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<NewtonEntry>) -
     left.into_values().collect()
 }
 
-/// Of trivial rows those that are `c ẋ + c′ v`, without a function of time or a constant.
+/// The trivial rows of the form `c ẋ + c′ v`, without a function of time or a constant.
 fn homogeneous(model: &Model, trivial: &[u32]) -> Vec<u32> {
     let Model { graph, residual, variables, .. } = model;
     let [x, z, u, p] = [&variables.x, &variables.z, &variables.u, &variables.p].map(|names| names.len());
     let time = 2 * x + z + u + p;
-    // Constants from outside and tables may have any value: zero is what remains of the equation
-    // where all variables are zero, whatever they are.
+    // Constants from outside and tables may have any value: with all variables zero, the rest of
+    // the equation has to be zero for all of them.
     let mut at_zero = graph.clone();
     let zero = at_zero.constant(0.0);
     let by = (0..=time as u32).map(|variable| (variable, zero)).collect();

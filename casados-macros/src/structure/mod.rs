@@ -1,5 +1,5 @@
-//! What can be known about a model before it runs: structural index, explicit form, linear rows,
-//! and the derivatives that the engine will ask for, as graphs.
+//! Compile-time analysis of a model: structural index, explicit form, linear rows, and the
+//! derivatives for the engine, as graphs.
 
 mod branches;
 mod elimination;
@@ -29,15 +29,16 @@ pub struct Derivatives {
     /// Non-zeros of the Jacobian `(equation, variable, value)`, by block (ẋ, x, z, u, p), row,
     /// column.
     pub jacobian: Vec<Entry>,
-    /// Where each block begins in `jacobian`, and its end.
+    /// The offset of each block in `jacobian`, and its length.
     pub blocks: [usize; 6],
-    /// Which entries of `jacobian` depend on no variable (on constants from outside they may).
+    /// Whether each entry of `jacobian` is independent of the variables (not of constants from
+    /// outside).
     pub constant: Vec<bool>,
-    /// `∇(μᵀ f)` over `(ẋ, x, z, u, p)`.
+    /// `∇(μᵀ f)` with respect to `(ẋ, x, z, u, p)`.
     pub gradient: Vec<Node>,
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`, `(variable, variable, value)`.
     pub hessian: Vec<Entry>,
-    /// Equations that are linear in `(ẋ, x, z, u, p)` jointly.
+    /// Whether each equation is linear in `(ẋ, x, z, u, p)` jointly.
     pub linear: Vec<bool>,
     /// Numbers of operations.
     pub operations: Operations,
@@ -45,45 +46,45 @@ pub struct Derivatives {
 
 /// A function with its derivatives.
 pub struct FunctionAnalysis {
-    /// The function; its graph holds the derivatives too.
+    /// The function; its graph also contains the derivatives.
     pub model: Model,
     /// Its derivatives.
     pub derivatives: Derivatives,
-    /// `∂y/∂t`, of the outputs that depend on the time.
+    /// `∂y/∂t` of the outputs that depend on time.
     pub time: Vec<(u32, Node)>,
-    /// The variables that an output depends on, ascending.
+    /// The variables on which an output depends, ascending.
     pub used: Vec<u32>,
 }
 
 /// A model with its derivatives and its structure.
 pub struct Analysis {
-    /// The model; its graph holds the derivatives too.
+    /// The model; its graph also contains the derivatives.
     pub model: Model,
     /// Its derivatives.
     pub derivatives: Derivatives,
-    /// What lets the engine leave work out.
+    /// Facts that let the engine skip work.
     pub facts: Facts,
-    /// Unknowns `(ẋ, z)` in which an equation may be nonlinear.
+    /// Whether an equation may be nonlinear in each unknown `(ẋ, z)`.
     pub nonlinear: Vec<bool>,
-    /// How many entries the whole of the Hessian has in rows of nonlinear variables.
+    /// The number of entries of the full Hessian in rows of nonlinear variables.
     pub symmetric: usize,
-    /// For an explicit model: for each state its row and coefficient.
+    /// For an explicit model the row and coefficient of each state.
     pub explicit: Option<Vec<(u32, f64)>>,
-    /// How the Newton matrix is eliminated.
+    /// The elimination of the Newton matrix.
     pub elimination: Elimination,
-    /// The conditions that may change within an interval, if there are any.
+    /// The conditions that may change within an interval, if any.
     pub branches: Option<BranchIndicators>,
-    /// What was differentiated, if the index was reduced.
+    /// The index reduction, if requested.
     pub reduction: Option<Reduction>,
 }
 
-/// A model whose index was reduced.
+/// The index reduction of a model.
 pub struct Reduction {
-    /// Equations that were differentiated, and how often.
+    /// The differentiated equations, with the number of differentiations.
     pub differentiated: Vec<(u32, u32)>,
     /// The rates of Baumgarte's stabilisation.
     pub rates: Vec<f64>,
-    /// How many sample points have a singular matrix `∂f/∂(ẋ, z)`, and how many there are.
+    /// The number of sample points with a singular matrix `∂f/∂(ẋ, z)`, and the number of all.
     pub singular: [u32; 2],
     /// The function of the invariants.
     pub invariants: FunctionAnalysis,
@@ -91,20 +92,20 @@ pub struct Reduction {
     pub projection: Option<FunctionAnalysis>,
 }
 
-/// The order in which the Newton matrix is eliminated.
+/// The elimination of the Newton matrix.
 pub struct Elimination {
-    /// The pivots in order, with the places of all blocks.
+    /// The pivots in order, with the positions of all blocks.
     pub plan: Plan,
-    /// What the engine is given of it.
+    /// The tables for the engine.
     pub tables: Tables,
 }
 
-/// Numbers of operations of one evaluation; an elementary function is one.
+/// Numbers of operations of one evaluation; an elementary function counts as one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
     /// `f`
     pub residual: u32,
-    /// `f` and the entries of its Jacobian that are not constant
+    /// `f` and the non-constant entries of its Jacobian.
     pub residual_jacobian: u32,
     /// `∇(μᵀ f)`
     pub adjoint: u32,
@@ -112,7 +113,7 @@ pub struct Operations {
     pub hessian: u32,
 }
 
-/// Reduces the index where that is asked for, and derives everything.
+/// Reduces the index if requested, and derives everything.
 pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     check_length(&model)?;
     let asked = model.reduction.is_some();
@@ -127,7 +128,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     Ok(analysis)
 }
 
-/// Derives everything, or says why the model is no index-1 DAE.
+/// Derives everything, or returns an error if the index is not 1.
 fn analyse_index_one(mut model: Model) -> syn::Result<Analysis> {
     let ends = ends(&model.variables);
     let derivatives = differentiate(&mut model, ends);
@@ -166,7 +167,7 @@ pub fn analyse_function(mut model: Model) -> FunctionAnalysis {
     FunctionAnalysis { model, derivatives, time, used: used.into_iter().collect() }
 }
 
-/// Where each of the blocks `(ẋ, x, z, u, p)` ends among the variables.
+/// The ends of the blocks `(ẋ, x, z, u, p)` among the variables.
 fn ends(names: &Variables) -> [u32; 5] {
     let mut end = 0;
     [names.x.len(), names.x.len(), names.z.len(), names.u.len(), names.p.len()].map(|length| {
@@ -246,7 +247,7 @@ fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &
     Elimination { plan, tables }
 }
 
-/// What is known about the values of each of the variables `(ẋ, x, z, u, p, t)`.
+/// The nominal values and ranges of the variables `(ẋ, x, z, u, p, t)`.
 fn samplings(model: &Model) -> Vec<Sampling> {
     let Variables { x, z, u, p } = &model.variables;
     let mut samplings = model.samplings.clone();
@@ -254,7 +255,7 @@ fn samplings(model: &Model) -> Vec<Sampling> {
     samplings
 }
 
-/// As many equations as unknowns.
+/// Checks that there are as many equations as unknowns.
 fn check_length(model: &Model) -> syn::Result<()> {
     let (equations, nx, nz) = (model.residual.len(), model.variables.x.len(), model.variables.z.len());
     if equations == nx + nz {
@@ -274,7 +275,8 @@ fn check_length(model: &Model) -> syn::Result<()> {
     Err(syn::Error::new(span, message))
 }
 
-/// Whether the Hessian has an entry for two unknowns of which it is one, whatever the states are.
+/// For each unknown, whether the Hessian has an entry for it and an unknown: the equations are
+/// nonlinear in it for given states.
 fn has_nonlinear_pair(hessian: &[Entry], [nx, end_x, end_z, ..]: [u32; 5]) -> Vec<bool> {
     let unknown = |variable: u32| match variable {
         derivative if derivative < nx => Some(derivative as usize),

@@ -1,16 +1,16 @@
-//! The Newton matrix of a model at sample points: what an elimination order is judged by.
+//! The Newton matrix of a model at sample points, for the choice of the elimination order.
 //!
-//! Where nothing is said about the values of a variable, points are of several kinds. The user may
-//! say more: a nominal value (the first point has it exactly, the others are within half of its
-//! size) and a range (no point is outside).
+//! Without a given nominal value or range of a variable, several kinds of points are used. A
+//! nominal value is exact at the first point, and the others are within half of its magnitude; all
+//! points are within a range.
 
 use super::elimination::{Complex, Entry};
 use crate::graph::{EvaluationPoint, Graph, Node};
 use crate::language::Sampling;
 use std::collections::BTreeMap;
 
-/// Sample points that are wanted, and how many may be drawn to get them: at some the model has no
-/// finite value.
+/// The number of sample points, and the maximum number of draws: the model may have no finite value
+/// at some points.
 const POINTS: usize = 12;
 const MAX_DRAWS: usize = 200;
 
@@ -25,9 +25,9 @@ pub struct NewtonEntry {
 /// `diag(f) (hA)^order`, times `c`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Term {
-    /// The entry of the Jacobian that is `f`.
+    /// The entry of the Jacobian `f`.
     pub entry: u32,
-    /// That which is `−c`; one if there is none.
+    /// The entry of the Jacobian `−c`; `None` for `c = 1`.
     pub by: Option<u32>,
     /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more through a
     /// kinematic state.
@@ -48,7 +48,7 @@ pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Ve
     positions.into_values().collect()
 }
 
-/// Values of nodes at sample points at which all of them are finite.
+/// The values of nodes at sample points at which all of them are finite.
 pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usize) -> Vec<Vec<f64>> {
     let mut random = Random::default();
     let points = Points { graph, nodes, samplings, constants: constants(&mut random, opaque) };
@@ -66,8 +66,8 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
 }
 
 /// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`;
-/// how many of these are at rest, the last ones: the first `states` of the variables are zero
-/// there, or at their nominal values, or as near to zero as their range allows.
+/// returns also the number of the last samples, at rest: there the first `states` variables are
+/// zero, or at their nominal values, or as close to zero as their range allows.
 pub fn sample(
     graph: &Graph,
     (jacobian, positions): (&[(u32, u32, Node)], &[NewtonEntry]),
@@ -108,7 +108,8 @@ pub fn sample(
     (entries, at_rest)
 }
 
-/// Appends the values of the non-zeros at a point with some `hμ`; with how many.
+/// Appends the values of the non-zeros at a point with several values of `hμ`; returns their
+/// number.
 fn append_sample(
     entries: &mut [Entry],
     positions: &[NewtonEntry],
@@ -117,7 +118,7 @@ fn append_sample(
 ) -> usize {
     const SIZES: usize = 2;
     for _ in 0..SIZES {
-        // Eigenvalues of A lie in the right half-plane; the step size may be anything.
+        // The eigenvalues of A are in the right half-plane; the step size is arbitrary.
         let size = 10f64.powf(random.between(-4.0, 0.0));
         let angle = random.between(-1.4, 1.4);
         let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
@@ -135,12 +136,12 @@ fn append_sample(
     SIZES
 }
 
-/// Values for constants from outside.
+/// Random values for constants from outside.
 fn constants(random: &mut Random, opaque: usize) -> Vec<f64> {
     (0..opaque).map(|_| random.between(0.5, 2.0)).collect()
 }
 
-/// What sample points are drawn for.
+/// The data of random sample points.
 struct Points<'a> {
     graph: &'a Graph,
     nodes: &'a [Node],
@@ -156,7 +157,7 @@ impl Points<'_> {
         self.evaluate(&point)
     }
 
-    /// The values where the first variables are at rest, and the others anywhere positive.
+    /// The values with the first variables at rest, and the others positive.
     fn at_rest(&self, random: &mut Random, states: usize) -> Vec<f64> {
         let rest = |sampling: &Sampling| match (sampling.nominal, sampling.range) {
             (Some(nominal), _) => nominal,
@@ -179,7 +180,7 @@ impl Points<'_> {
     }
 }
 
-/// The block is the identity, whatever the step size and the point.
+/// Whether the block is the identity for every step size and point.
 pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &NewtonEntry) -> bool {
     match position.terms[..] {
         [Term { entry, order: 0, .. }] => graph.value(jacobian[entry as usize].2) == Some(1.0),
@@ -187,7 +188,7 @@ pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Newt
     }
 }
 
-/// A coordinate of the point with this number.
+/// A coordinate of the sample point with this index.
 fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
     let anywhere = unbounded_coordinate(random, draw);
     match (sampling.nominal, sampling.range) {
@@ -199,7 +200,7 @@ fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
     }
 }
 
-/// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any
+/// Coordinates of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any
 /// magnitude.
 fn unbounded_coordinate(random: &mut Random, draw: usize) -> f64 {
     let value = random.between(-1.0, 1.0);

@@ -1,17 +1,17 @@
-//! Supernodes: pivots one after the other whose columns of `L` and rows of `U` are the same but for
-//! themselves, so that what these have in common is looked up once (J. W. H. Liu, E. G. Ng, B. W.
-//! Peyton, On finding supernodes for sparse matrix computations, 1993).
+//! Supernodes: successive pivots with the same columns of `L` and rows of `U`, except for
+//! themselves, whose indices are looked up once (J. W. H. Liu, E. G. Ng, B. W. Peyton, On finding
+//! supernodes for sparse matrix computations, 1993).
 
 use super::elimination::Plan;
 use std::collections::HashMap;
 
-/// So many pivots at most does the engine take together.
+/// Maximum number of pivots in a supernode.
 const MAX_SUPERNODE: usize = 4;
 
-/// How many pivots from each on are one; zero if one before has counted it.
+/// The size of the supernode that starts at each pivot; zero within one.
 pub fn find(plan: &Plan) -> Vec<u32> {
     let Plan { pivots, ranges, blocks, .. } = plan;
-    // Blocks of `L` row by row.
+    // The blocks of `L`, row by row.
     let mut left: HashMap<u32, Vec<u32>> = HashMap::new();
     for &[block, upper, _] in ranges {
         for index in block + 1..upper {
@@ -27,7 +27,7 @@ pub fn find(plan: &Plan) -> Vec<u32> {
         let ([block, upper, end], [next_block, next_upper, next_end]) = (ranges[first], ranges[first + 1]);
         let below = std::iter::once(next_row).chain(rows(next_block + 1, next_upper));
         let beside = columns(next_upper, next_end).chain(std::iter::once(next_column));
-        // Blocks of a column that belong to their rows lie one after the other.
+        // The blocks of a column that belong to these rows are contiguous.
         let before = left(row).iter().map(|index| index + 1).chain(std::iter::once(block + 1));
         rows(block + 1, upper).eq(below)
             && columns(upper, end).eq(beside)
@@ -49,7 +49,7 @@ mod tests {
     use super::super::elimination::{Complex, Entry, plan};
     use super::*;
 
-    /// A matrix with these entries, diagonally dominant.
+    /// A diagonally dominant matrix with these entries.
     fn of(size: u32, is_entry: impl Fn(u32, u32) -> bool) -> Plan {
         let mut entries = Vec::new();
         for row in 0..size {
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn rows_have_the_same_blocks_before_them() {
-        // Column 0 meets row 1 only, and goes first: rows 1 and 2 are not alike.
+        // Column 0 has an entry in row 1 only, and is first: rows 1 and 2 differ.
         let plan =
             of(4, |row, column| column == 3 || row == 3 || row * column == 2 || (row, column) == (1, 0));
         assert_eq!(plan.pivots, [(0, 0), (2, 2), (1, 1), (3, 3)]);

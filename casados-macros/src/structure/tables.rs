@@ -1,5 +1,5 @@
-//! The tables of `casados_core::model::Elimination`, as data: `emit/elimination.rs` prints them.
-//! A slot is an unknown and the equation that is its pivot.
+//! The tables of `casados_core::model::Elimination` as data: `emit/elimination.rs` emits them. A
+//! slot is an unknown and the equation that is its pivot.
 
 use super::elimination::Plan;
 use super::kinematic::Kinematic;
@@ -12,12 +12,12 @@ pub struct Tables {
     pub pivots: Vec<Pivot>,
     /// For each block the slot at its other end.
     pub slots: Vec<u32>,
-    /// Blocks of `L` with their slots, pivot by pivot.
+    /// The blocks of `L` with their slots, pivot by pivot.
     pub left: Vec<[u32; 2]>,
     pub updates: Vec<Update>,
     pub assembly: Vec<Assembly>,
     pub slot_of_equation: Vec<u32>,
-    /// The first pivot of each supernode, and how many pivots it has.
+    /// The first pivot of each supernode, and its number of pivots.
     pub supernodes: Vec<[u32; 2]>,
     /// For each state `(equation, entry, velocity)`; empty if no state is kinematic.
     pub kinematic: Vec<[u32; 3]>,
@@ -28,14 +28,14 @@ pub struct Tables {
 pub struct Pivot {
     pub slot: u32,
     pub equation: u32,
-    /// Where its blocks begin, where those of `U` do, and their end.
+    /// The offsets of its blocks and of those of `U`, and their end.
     pub range: [u32; 3],
-    /// Its part of the table `left`.
+    /// Its range of the table `left`.
     pub left: [u32; 2],
     pub identity: bool,
 }
 
-/// `casados_core::model::Update`: nothing is in the block before the first one.
+/// `casados_core::model::Update`; the block is empty before the `first` one.
 pub struct Update {
     pub block: u32,
     pub first: bool,
@@ -56,7 +56,7 @@ pub struct KinematicDependence {
     pub last: bool,
 }
 
-/// The tables of a plan for so many equations and states.
+/// The tables of a plan for these numbers of equations and states.
 pub fn of(
     plan: &Plan,
     positions: &[NewtonEntry],
@@ -87,7 +87,7 @@ pub fn of(
     }
 }
 
-/// Of a block of `L` the slot of its equation, of a block of `U` that of its unknown.
+/// For a block of `L` the slot of its equation, for a block of `U` that of its unknown.
 fn slots(plan: &Plan, slot_of_equation: &[u32]) -> Vec<u32> {
     let slot = |index: u32, upper: u32| {
         let (equation, unknown) = plan.blocks[index as usize];
@@ -115,8 +115,8 @@ fn pivots(plan: &Plan, slots: &[u32], identity: &[bool]) -> (Vec<Pivot>, Vec<[u3
     (pivots, left)
 }
 
-/// What blocks are made of, those of a kind one after the other, fill first: what is done to them
-/// then has no branches that nobody can foresee.
+/// The terms of the blocks, contiguous by kind, fill first, so that loops have no unpredictable
+/// branches.
 fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &NewtonEntry>) -> Vec<Assembly> {
     let mut rows = Vec::new();
     for (place, block) in plan.blocks.iter().zip(0u32..) {
@@ -135,14 +135,14 @@ fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &NewtonEntry>) -> Vec<A
         .collect()
 }
 
-/// For each update its block, and whether nothing is there before.
+/// For each update its block, and whether the block is empty before.
 fn updates(plan: &Plan, positions: &HashMap<(u32, u32), &NewtonEntry>) -> Vec<Update> {
     let is_empty = |block: &u32| !positions.contains_key(&plan.blocks[*block as usize]);
     let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32).filter(is_empty).collect();
     plan.updates.iter().map(|&block| Update { block, first: empty.remove(&block) }).collect()
 }
 
-/// A row for each state, none if no state is kinematic.
+/// A row for each state; none if no state is kinematic.
 fn rows_of_states(nx: usize, kinematic: &[Kinematic]) -> Vec<[u32; 3]> {
     let states = 0..if kinematic.is_empty() { 0 } else { nx as u32 };
     let row = |state: u32| {
@@ -152,7 +152,7 @@ fn rows_of_states(nx: usize, kinematic: &[Kinematic]) -> Vec<[u32; 3]> {
     states.map(row).collect()
 }
 
-/// The entries by which other equations depend on kinematic states, by velocities.
+/// The entries by which other equations depend on kinematic states, ordered by velocity.
 fn kinematic_dependences(kinematic: &[Kinematic]) -> Vec<KinematicDependence> {
     let of_state = |of: &Kinematic| {
         let (state, count) = (of.state, of.dependents.len());

@@ -38,12 +38,16 @@ mod ball {
 const GRAVITY: f64 = 9.81;
 
 /// A ball that falls from a height and bounces `count` times, with a wind; each flight takes as
-/// long as it takes.
-fn flight_problem(count: usize, n: usize) -> Result<Vec<HeapOcp<impl ExactFormulation<f64>>>, OcpError> {
+/// long as it takes, with a guess of that.
+fn flight_problem(
+    count: usize,
+    n: usize,
+    guess: f64,
+) -> Result<Vec<HeapOcp<impl ExactFormulation<f64>>>, OcpError> {
     let flight = |index: usize| {
         let mut flight = Problem::new(Irk::<Ball, Gauss<2>>::new(Options::default())?)
             .running_cost(GeneralCost::<Effort>::new())
-            .on(Horizon::free(n, 0.01..=10.0, 0.6))?;
+            .on(Horizon::free(n, 0.01..=10.0, guess))?;
         flight.set_parameters(.., &[0.0, GRAVITY])?.guess(&[0.5, 0.0, 0.0, 0.0], &[0.0])?;
         if index < count {
             flight.bound("x.height", n.., 0.0, 0.0)?;
@@ -75,7 +79,7 @@ fn exact_durations(count: usize) -> Vec<f64> {
 fn times_of_impact() -> Test {
     for count in [1, 3] {
         for by_sqp in [false, true] {
-            let mut flights = flight_problem(count, 6)?;
+            let mut flights = flight_problem(count, 6, 0.6)?;
             let (first, others) = flights.split_first_mut().ok_or("none")?;
             let bounces =
                 others.iter_mut().fold(Phases::new(first), |all, next| all.then(Jump::<Impact>::new(), next));
@@ -105,7 +109,7 @@ fn times_of_impact() -> Test {
 /// flights last as long as gravity says.
 #[test]
 fn multipliers_across_an_impact() -> Test {
-    let mut flights = flight_problem(1, 200)?;
+    let mut flights = flight_problem(1, 200, 0.6)?;
     let [first, second] = &mut flights[..] else { return Err("two".into()) };
     let mut bounce = Phases::new(first).then(Jump::<Impact>::new(), second).join()?;
     let outcome = HeapIpm::new(&bounce)?.solve(&mut bounce)?;
@@ -127,5 +131,29 @@ fn multipliers_across_an_impact() -> Test {
     let first = other.control("u")?[0];
     assert!((first - 0.5 * lambda * (t2 - 0.5 * h)).abs() < 2e-5 * start, "{first}");
     assert!((outcome.objective - 0.25 * lambda * lambda * squares).abs() < 2e-5 * outcome.objective);
+    Ok(())
+}
+
+/// From guesses a tenth to three times as long as flights are. Durations have no choice: steps from
+/// feasible points change multipliers alone.
+#[test]
+fn flights_are_found_from_far() -> Test {
+    for guess in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0] {
+        for by_sqp in [false, true] {
+            let mut flights = flight_problem(1, 6, guess)?;
+            let [first, second] = &mut flights[..] else { return Err("two".into()) };
+            let mut bounce = Phases::new(first).then(Jump::<Impact>::new(), second).join()?;
+            let outcome = if by_sqp {
+                HeapSqp::new(&bounce)?.solve(&mut bounce)?
+            } else {
+                HeapIpm::new(&bounce)?.solve(&mut bounce)?
+            };
+            assert!(outcome.is_converged(), "{guess} {by_sqp}: {outcome}");
+            drop(bounce);
+            for (flight, expected) in flights.iter_mut().zip(exact_durations(1)) {
+                assert!((flight.solution()?.end_time() - expected).abs() < 1e-7);
+            }
+        }
+    }
     Ok(())
 }

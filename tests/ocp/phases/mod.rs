@@ -1,9 +1,11 @@
 //! Problems of several phases: closed forms, published values, the QP by differences, mistakes.
 
 mod bounce;
-mod kkt;
+mod collocated;
+pub mod kkt;
 mod launch;
 mod mistakes;
 mod program;
 mod quadratic;
 mod robot;
+mod shared;

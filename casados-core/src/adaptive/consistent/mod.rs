@@ -1,7 +1,7 @@
 //! Consistent `ẋ` and `z` at a point: the solution of `f(ẋ, x, u, z, p, t) = 0` for given `x`.
 //!
-//! It is one stage of the explicit Euler method, whose stage is at the start of the step. Explicit
-//! models have their [`Rates`].
+//! Implicit models use one step of the explicit Euler method, whose only stage is at the start of
+//! the step; explicit models use [`ExplicitRates`].
 
 mod rates;
 
@@ -20,7 +20,7 @@ use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use rates::ExplicitRates;
 
-/// One stage at the start of a step.
+/// One stage at the start of the step.
 type EulerStep<M, T> = Integrator<M, Custom<1>, 1, T, Heap<OneStep>>;
 
 /// Solves for `(ẋ, z)`.
@@ -36,7 +36,7 @@ impl<M: Dae, T: Real> Default for Consistent<M, T> {
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
-    /// Nothing has to be iterated for.
+    /// Explicit models need no iteration.
     const IS_EXPLICIT: bool = M::STRUCTURE.is_explicit();
 
     fn explicit_rates(&mut self) -> Result<&mut ExplicitRates<M, T>, Error> {
@@ -66,11 +66,10 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         Ok(euler)
     }
 
-    /// From the start values in `y`: `(ẋ, z)` there; the number of points at which the model was
-    /// evaluated.
+    /// Solves for `(ẋ, z)` from the initial guess `y`; returns the number of model evaluations.
     ///
     /// # Errors
-    /// [`Error::InconsistentStart`]; the others of Newton's method.
+    /// [`Error::InconsistentStart`]; the errors of Newton's method.
     pub fn solve(&mut self, at: &ModelPoint<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
         if const { Self::IS_EXPLICIT } {
             self.explicit_rates()?.evaluate(at, y)?;
@@ -85,8 +84,8 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         Ok(statistics.residuals + statistics.jacobians)
     }
 
-    /// As [`Consistent::solve`], from start values that may be far away: an error says what they
-    /// have to do with it.
+    /// As [`Consistent::solve`], for an initial guess by the user: the error reports whether the
+    /// guess caused it.
     ///
     /// # Errors
     /// As [`Consistent::solve`]; [`Error::NonFiniteStart`].
@@ -106,7 +105,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         }
     }
 
-    /// The derivatives of `z`, from `(ẋ, z)`.
+    /// The derivatives of `z` at the consistent point `y = (ẋ, z)`.
     ///
     /// # Errors
     /// As [`Consistent::solve`].
@@ -116,7 +115,8 @@ impl<M: Dae, T: Real> Consistent<M, T> {
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
-    /// The derivatives of `ẋ` by `(x, u, p)`, a row for each direction, from `(ẋ, z)`.
+    /// The derivatives of `ẋ` with respect to `(x, u, p)` at the consistent point `(ẋ, z)`, one row
+    /// for each direction.
     ///
     /// # Errors
     /// As [`Consistent::solve`].
@@ -130,12 +130,12 @@ impl<M: Dae, T: Real> Consistent<M, T> {
             return self.explicit_rates()?.differentiate(at, to);
         }
         self.forward(at, y)?;
-        // The slope of the only stage.
+        // The slope of the single stage.
         self.euler_step.as_mut().ok_or(Error::NoResult)?.slope_derivatives(&[1.0], to)
     }
 }
 
-/// What is inconsistent where Newton's method ended.
+/// The error that describes the inconsistency at the last iterate of Newton's method.
 fn inconsistency_error<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> Error {
     let (unknown, worst) = match error {
         Error::Singular { unknown, .. } => (unknown, None),

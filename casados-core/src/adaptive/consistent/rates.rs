@@ -1,5 +1,5 @@
-//! Rates of an explicit model: each equation has one derivative, `c ẋ_j + g(x, u, p, t) = 0`, and
-//! is solved for it by hand. No integrator is compiled for that.
+//! Rates `ẋ` of an explicit model. Each equation `c ẋ_j + g(x, u, p, t) = 0` is solved by division,
+//! which compiles no integrator.
 
 use crate::adaptive::point::{ModelPoint, write_inputs};
 use crate::error::{Error, Place, Quantity};
@@ -16,7 +16,7 @@ use bytemuck::Zeroable;
 pub struct ExplicitRates<M: Dae, T: Plain> {
     variables: ArrayV<M, T>,
     residual: ArrayK<M, T>,
-    /// The first entries are the coefficients `c`, equation by equation.
+    /// The Jacobian; its first entries are the coefficients `c` of the equations.
     jacobian: M::Jacobian<T>,
 }
 
@@ -29,7 +29,7 @@ impl<M: Dae, T: Real> ExplicitRates<M, T> {
         Ok(rates)
     }
 
-    /// `ẋ` at a point.
+    /// Evaluates `ẋ` at a point.
     ///
     /// # Errors
     /// [`Error::NonFiniteModel`]
@@ -49,7 +49,7 @@ impl<M: Dae, T: Real> ExplicitRates<M, T> {
         Ok(())
     }
 
-    /// The derivatives of `ẋ` by `(x, u, p)`, a row for each direction.
+    /// The derivatives of `ẋ` with respect to `(x, u, p)`, one row for each direction.
     ///
     /// # Errors
     /// [`Error::NonFiniteModel`]

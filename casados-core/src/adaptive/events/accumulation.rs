@@ -1,5 +1,5 @@
-//! Events that come sooner and sooner: the paradox of Zeno (J. Zhang, K. H. Johansson, J. Lygeros,
-//! S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001)).
+//! Accumulation of events, the Zeno phenomenon (J. Zhang, K. H. Johansson, J. Lygeros, S. Sastry,
+//! Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001)).
 
 use super::Hybrid;
 use crate::adaptive::engine::Engine;
@@ -7,14 +7,14 @@ use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
 
-/// The ratio of the times between four events is the same, to this part.
+/// Relative tolerance of the ratios of successive times between four events.
 const RATIO_TOLERANCE: f64 = 0.2;
-/// What is left until they accumulate is no more than so many roundoff errors of the time.
+/// The accumulation point is unresolved within this number of roundoff errors of the time.
 const UNRESOLVED_ROUNDOFFS: f64 = 1e3;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
-    /// [`Error::AccumulatingEvents`] where the time does not resolve what is left.
+    /// [`Error::AccumulatingEvents`] if the time to the accumulation point is below rounding.
     pub(super) fn check_accumulation(&self, event: usize) -> Result<(), Error> {
         let Some((t, end)) = self.accumulation_time(event) else { return Ok(()) };
         if (end - t).abs() > UNRESOLVED_ROUNDOFFS * T::EPSILON * end.abs().max(t.abs()) {
@@ -23,7 +23,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Err(self.accumulating_events_error(event, end))
     }
 
-    /// More events than are allowed, or those that accumulate.
+    /// The error for too many events: `AccumulatingEvents` if they accumulate, `TooManyEvents`
+    /// otherwise.
     pub(super) fn too_many_events_error(&self, t: T) -> Error {
         let events = self.solution.occurrences.len();
         let last = self.solution.occurrences.last().map_or(0, |at| at.event);
@@ -38,8 +39,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Error::AccumulatingEvents { t, function, event, events: self.solution.occurrences.len() }
     }
 
-    /// The time of the last event of a kind, and where a geometric series through the last four
-    /// ends.
+    /// The time of the last event of a kind, and the limit of the geometric series through the last
+    /// four.
     fn accumulation_time(&self, event: usize) -> Option<(f64, f64)> {
         let of_kind = self.solution.occurrences.iter().rev().filter(|at| at.event == event);
         let mut times = of_kind.map(|at| at.t.to_f64());

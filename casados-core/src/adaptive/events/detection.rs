@@ -1,11 +1,12 @@
-//! From event to event: the steps up to each, shortened to its time, and what happens there.
+//! Integration from event to event: the steps up to each event, the last one shortened to its time,
+//! and the jump.
 
 use super::evaluate::{check_finite, evaluate_event_function, write_point};
 use super::event_function::EventFunctionPoint;
 use super::{Event, EventLinearisation, Hybrid};
 use crate::adaptive::engine::Engine;
 use crate::adaptive::point::{ModelPoint, write_inputs};
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::segment::push_segment;
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
@@ -17,23 +18,23 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// Each step is looked at in so many pieces: a function that crosses zero twice in one of them is
-/// not seen.
+/// Subintervals of a step that are tested for a sign change: two zero crossings within one of them
+/// are missed.
 const PARTS_PER_STEP: usize = 4;
-/// A crossing is enclosed by so many bisections, to a millionth of a piece; then the step itself is
-/// made to end there.
+/// Bisections that enclose a crossing, to a millionth of a subinterval; then the length of the step
+/// itself is solved for.
 const MAX_BISECTIONS: usize = 20;
-/// By so many iterations of Newton's method at most.
+/// Iterations of Newton's method for the length of the step that ends at the event.
 pub(super) const MAX_NEWTON_ITERATIONS: usize = 20;
-/// A function that moves so much slower at the event than over the step before only touches zero.
+/// A zero whose rate, relative to the mean rate over the step, is below this is a tangency.
 const MIN_CROSSING_RATE_RATIO: f64 = 1e-8;
 
-/// A crossing: which event, and a time near it.
+/// The index of an event and the approximate time of its crossing.
 type CrossingEstimate<T> = Option<(usize, T)>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Integrates an interval of length `h`, from event to event. There is a result as soon as the
-    /// caller says so.
+    /// Integrates an interval of length `h`, from event to event. The caller marks the result as
+    /// valid.
     pub(super) fn integrate_with_events(
         &mut self,
         x0: &VectorX<M, T>,
@@ -86,7 +87,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
     }
 
-    /// The steps up to the one in which an event happens, or to the end.
+    /// Takes the steps up to the one in which an event happens, or to the end.
     fn integrate_until_event(
         &mut self,
         k: usize,
@@ -122,7 +123,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
         let (parameters, mut found, mut begin) = (integrator.workspace.parameters, None, start);
         write_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
-        // Each part has a tape of its own, which in later calls is long enough.
+        // Each segment has a tape of its own, which later calls reuse.
         core::mem::swap(&mut integrator.tape, &mut segment.tape);
         integrator.options.max_steps = allowed - tried;
         let run = integrator.run_to(x, u, t_end, true, |step, dense| {
@@ -156,14 +157,14 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     if earlier {
                         found = Some((index, b));
                     }
-                    // The bisection left the memory at another time.
+                    // The bisection left the dense output at another time.
                     (step.evaluate_dense)(high, dense)?;
                 }
                 if found.is_some() {
                     step.stop = true;
                     return Ok(());
                 }
-                // Zero is on the way from one side to the other.
+                // A zero keeps the sign of the side that the function comes from.
                 for (sign, value) in signs.iter_mut().zip(values.iter()).filter(|(_, value)| **value != 0.0) {
                     *sign = *value;
                 }
@@ -183,8 +184,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
     }
 
-    /// On which side of zero each function begins. Where it is zero to rounding, it is on the side
-    /// that it goes to.
+    /// Sets the sign of each function at the start of the segment. A function that is zero to
+    /// rounding has the sign that it takes next.
     fn set_function_signs(
         &mut self,
         k: usize,
@@ -194,11 +195,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     ) -> Result<(), Error> {
         let start = self.integrator.start_time;
         let forward = if t_end < start { -1.0 } else { 1.0 };
-        // A segment after an event begins where a function is zero but for the rounding of the
-        // time.
+        // A segment after an event starts at a zero of its function, to the rounding of the time.
         let time = if k == 0 { T::ZERO } else { start };
         let given = self.integrator.workspace.start_guess;
-        // Where there is none the integration says so.
+        // If there are no consistent derivatives, the integration returns the error.
         let y = if self.events.is_empty() {
             given
         } else {
@@ -215,7 +215,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         extend(&mut self.function_values, &self.function_signs)
     }
 
-    /// The last step of a segment is made to end where the event is: its time.
+    /// Changes the length of the last step of a segment so that it ends at the event; returns the
+    /// time.
     pub(super) fn end_step_at_event(&mut self, k: usize, event: &Event<M, T>, t: T) -> Result<T, Error> {
         let Some(step) = self.segments.get(k).and_then(|segment| segment.tape.entries().len().checked_sub(1))
         else {
@@ -234,8 +235,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let guard = self.event_function_at(k, event, (&x, &u, time), &y)?;
             let change = -(guard.value / guard.rate);
             let next = h + change;
-            // Within the step, as far as the polynomial was right; a crossing without slope stays
-            // where it was found.
+            // The time stays within the step, up to the error of the polynomial; a crossing with
+            // rate zero keeps the time from bisection.
             let slack = T::from_f64(1e-3) * entry.h.abs();
             let inside =
                 (next - h).abs() <= entry.h.abs() && (next - (t - entry.t)).abs() <= entry.h.abs() + slack;
@@ -251,7 +252,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let x = self.step_end(k, step, h)?;
         let end = entry.t + h;
         if let Some(segment) = self.segments.get_mut(k) {
-            let stages = B::replays(&mut self.integrator.method_state).stages(entry.order_index)?;
+            let stages = B::differentiator(&mut self.integrator.method_state).stages(entry.order_index)?;
             segment.tape.replace_last_step(h, M::Shape::NX, stages);
             segment.span.end = end;
         }
@@ -259,7 +260,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(end)
     }
 
-    /// Where a step of another length ends.
+    /// The state at the end of a step with the length `h`.
     fn step_end(&mut self, k: usize, step: usize, h: T) -> Result<VectorX<M, T>, Error> {
         let Self { integrator, segments, .. } = self;
         let (Some(segment), mut x) = (segments.get(k), VectorX::<M, T>::zeroed()) else {
@@ -269,17 +270,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.step_numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = ModelPoint { x: &x, u: &segment.u, p: &integrator.workspace.parameters, t: entry.t };
-        let taken = AcceptedStep {
+        let taken = StepRecord {
             start: at,
             h,
             stage_unknowns: y,
             order_index: entry.order_index,
             stages_are_solved: false,
         };
-        Ok(B::replays(&mut integrator.method_state).solve(&taken, None)?.x)
+        Ok(B::differentiator(&mut integrator.method_state).solve(&taken, None)?.x)
     }
 
-    /// `(ẋ, z)` at a state.
+    /// The consistent `(ẋ, z)` at a state.
     pub(super) fn consistent_derivatives(
         &mut self,
         x: &VectorX<M, T>,
@@ -287,7 +288,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         t: T,
     ) -> Result<ArrayK<M, T>, Error> {
         let (nx, point) = (M::Shape::NX, self.integrator.workspace.point.as_ref());
-        // From where the last step ended.
+        // Starts from the end of the last step.
         let mut y = ArrayK::<M, T>::zeroed();
         for (y, from) in y.as_mut().iter_mut().zip(point[..nx].iter().chain(&point[2 * nx..])) {
             *y = *from;
@@ -295,7 +296,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         self.consistent_derivatives_from(y, x, u, t)
     }
 
-    /// The same from start values `y`.
+    /// As `consistent_derivatives`, from the initial guess `y`.
     pub(super) fn consistent_derivatives_from(
         &mut self,
         mut y: ArrayK<M, T>,
@@ -309,7 +310,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(y)
     }
 
-    /// Goes to where an event happened.
+    /// Moves the state and the time to the event.
     pub(super) fn move_to_event(&mut self, k: usize) {
         let parameters = self.integrator.workspace.parameters;
         let (Some(segment), Some(at)) = (self.segments.get(k), self.solution.occurrences.get(k)) else {
@@ -319,11 +320,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         write_point::<M, T>(&mut self.variables, &at.before, &[], at.t);
     }
 
-    /// What is known about the moment of the event that ends a segment, whose steps were just taken
-    /// again.
+    /// Linearises the event that ends a segment, whose steps have just been replayed.
     ///
     /// # Errors
-    /// [`Error::Grazing`]; no consistent derivative; a jump that is not finite.
+    /// [`Error::Grazing`]; no consistent derivatives; a jump that is not finite.
     #[allow(clippy::type_complexity)]
     pub(super) fn linearise_event(
         &mut self,
@@ -364,8 +364,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// The slope at an event is one to divide by, beside the mean slope over the step that ends
-    /// there.
+    /// Tests that the crossing is transversal: the rate at the event is not small relative to the
+    /// mean rate over the last step.
     ///
     /// # Errors
     /// [`Error::Grazing`]

@@ -1,4 +1,4 @@
-//! Functions of events, and whether they are finite.
+//! Evaluation of event functions, with checks for finite values.
 
 use super::Event;
 use crate::error::{Error, Place};
@@ -8,8 +8,7 @@ use crate::result::Dense;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-/// The state, the algebraic states that are given, and the time to where they lie among the
-/// variables.
+/// Writes the state, the given algebraic states and the time to their places among the variables.
 pub(super) fn write_point<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, z: &[T], t: T) {
     let nx = M::Shape::NX;
     let v = v.as_mut();
@@ -22,7 +21,7 @@ pub(super) fn write_point<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, 
     }
 }
 
-/// The function of an event at a point of the polynomial of a step.
+/// Evaluates an event function at a point of the dense output of a step.
 pub(super) fn evaluate_event_function<M: Dae, T: Real>(
     event: &Event<M, T>,
     v: &mut ArrayV<M, T>,
@@ -36,7 +35,7 @@ pub(super) fn evaluate_event_function<M: Dae, T: Real>(
     Ok(value.to_f64())
 }
 
-/// `ġ = ∂g/∂t + g_x ẋ`, with the gradient over all variables.
+/// `ġ = ∂g/∂t + g_x ẋ`, with the gradient with respect to all variables.
 pub(super) fn event_function_rate<M: Dae, T: Real>(
     gradient: &ArrayV<M, T>,
     by_t: T,

@@ -1,4 +1,4 @@
-//! What an event is: where it happens, and what happens then.
+//! The definition of an event: its function, its direction, and its effect.
 
 use crate::function::{ArrayY, Function};
 use crate::model::{ArrayV, ArrayX, Dae};
@@ -6,7 +6,7 @@ use crate::scalar::Real;
 use crate::shape::{Outputs, Shape, copy};
 use bytemuck::Zeroable;
 
-/// In which direction a function crosses zero.
+/// The direction in which an event function crosses zero.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -32,16 +32,16 @@ use bytemuck::Zeroable;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
-    /// From below.
+    /// From negative to positive.
     Rising,
-    /// From above.
+    /// From positive to negative.
     Falling,
-    /// Both.
+    /// Both directions.
     Any,
 }
 
 impl Crossing {
-    /// Whether it goes from one sign to the other.
+    /// Whether the signs change in this direction.
     pub(super) fn matches(self, before: f64, after: f64) -> bool {
         let rising = before < 0.0 && after >= 0.0;
         let falling = before > 0.0 && after <= 0.0;
@@ -53,8 +53,8 @@ impl Crossing {
     }
 }
 
-/// A zero crossing of a function `g(x, z, u, p, t)`, where an integration ends or the state jumps
-/// to `j(x, u, p, t)`.
+/// A zero crossing of an event function `g(x, z, u, p, t)`, at which the integration ends or the
+/// state jumps to `j(x, u, p, t)`.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -80,20 +80,20 @@ pub struct Event<M: Dae, T: Real = f64> {
 }
 
 impl<M: Dae, T: Real> Event<M, T> {
-    /// The integration ends where the only output of `G` crosses zero.
+    /// An event that ends the integration where the only output of `G` crosses zero.
     ///
-    /// That `G` has one output is checked when the program is compiled.
+    /// The compiler checks that `G` has one output.
     #[must_use]
     pub fn terminal<G: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(G::Outputs::NY == 1, "the function of an event has one output") };
         Self { crossing, guard: EventFunction::of::<G>(), jump: None }
     }
 
-    /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state
-    /// before.
+    /// An event at which the state jumps: where the only output of `G` crosses zero, the output of
+    /// `J` replaces the state.
     ///
-    /// That `G` has one output and `J` one for each state, and that `J` does not depend on `z`, is
-    /// checked when the program is compiled.
+    /// The compiler checks that `G` has one output, that `J` has one output for each state, and
+    /// that `J` does not depend on `z`.
     #[must_use]
     pub fn jump<G: Function<Shape = M::Shape>, J: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(J::Outputs::NY == <M::Shape as Shape>::NX, "a jump has one output for each state") };
@@ -111,16 +111,16 @@ impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
     }
 }
 
-/// Variables and multipliers to the gradient.
+/// Writes the gradient, given the variables and multipliers.
 type GradientFn<M, T> = fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>);
 
-/// Variables and multipliers to the entries of the lower triangle of the Hessian.
+/// Visits the entries of the lower triangle of the Hessian, given the variables and multipliers.
 type HessianFn<M, T> = fn(&ArrayV<M, T>, &[T], &mut dyn FnMut(usize, usize, T));
 
-/// A function with at most as many outputs as there are states.
+/// A function with at most as many outputs as states.
 pub(super) struct EventFunction<M: Dae, T: Real> {
     pub name: &'static str,
-    /// Whether it looks at algebraic states.
+    /// Whether it depends on algebraic states.
     pub reads_algebraic_states: bool,
     value: fn(&ArrayV<M, T>, &mut [T]),
     gradient_fn: GradientFn<M, T>,
@@ -130,7 +130,7 @@ pub(super) struct EventFunction<M: Dae, T: Real> {
 
 copy!([M: Dae, T: Real] EventFunction<M, T>);
 
-/// `y` of a function, from one that writes it.
+/// The outputs of a function as an array.
 fn write_outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F, T>)) {
     let mut y = ArrayY::<F, T>::zeroed();
     write(&mut y);
@@ -139,7 +139,7 @@ fn write_outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut Arr
     }
 }
 
-/// One for each output.
+/// The multipliers, one for each output.
 fn multiplier_array<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
     let mut all = ArrayY::<F, T>::zeroed();
     for (to, from) in all.as_mut().iter_mut().zip(mu) {
@@ -149,7 +149,7 @@ fn multiplier_array<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
 }
 
 impl<M: Dae, T: Real> EventFunction<M, T> {
-    /// Of a function that does not look at algebraic states.
+    /// Checks that the function does not depend on algebraic states.
     fn of_states_only<F: Function<Shape = M::Shape>>() -> Self {
         const {
             assert!(
@@ -192,7 +192,8 @@ impl<M: Dae, T: Real> EventFunction<M, T> {
         y
     }
 
-    /// The entries of the lower triangle of `∇²(μᵀy)`, row and column among all variables.
+    /// Visits the entries of the lower triangle of `∇²(μᵀy)`; row and column are indices of
+    /// variables.
     pub fn hessian(&self, v: &ArrayV<M, T>, mu: &[T], each: &mut dyn FnMut(usize, usize, T)) {
         (self.hessian)(v, mu, each);
     }
@@ -203,7 +204,7 @@ impl<M: Dae, T: Real> EventFunction<M, T> {
         (self.gradient_fn)(v, mu, &mut gradient);
         let mut rate = ArrayX::<M, T>::zeroed();
         let rate = rate.as_mut();
-        // A model without states has no event that depends on the time alone.
+        // A model without states has no event that depends on time alone.
         (self.time_derivative)(v, rate);
         (gradient, mu.iter().zip(rate).fold(T::ZERO, |sum, (mu, rate)| sum + *mu * *rate))
     }

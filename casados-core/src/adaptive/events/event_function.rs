@@ -1,10 +1,10 @@
-//! The function of an event along the solution, with algebraic states as functions of the others:
+//! The event function along the solution, with algebraic states as implicit functions:
 //!
 //! ```text
 //! G(x, u, p, t) = g(x, z(x, u, p, t), u, p, t)        G_w = g_w + g_z z_w        ġ = G_x ẋ + G_t
 //! ```
 //!
-//! `z_w` follows from the algebraic equations by the theorem of implicit functions.
+//! `z_w` follows from the algebraic equations by the implicit function theorem.
 
 use super::evaluate::{check_finite, event_function_rate, write_point};
 use super::{Event, Hybrid};
@@ -15,22 +15,22 @@ use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Shape};
 
-/// So many units of rounding of its terms are zero.
+/// Rounding errors of its terms within which an event function counts as zero.
 const ZERO_TOLERANCE_ROUNDOFFS: f64 = 64.0;
 
-/// A function at a point of the solution.
+/// An event function with its derivatives at a point of the solution.
 pub(super) struct EventFunctionPoint<M: Dae, T: Real> {
     pub value: T,
-    /// `G_v`, zero by the algebraic states.
+    /// `G_v`, with zeros for the algebraic states.
     pub gradient: ArrayV<M, T>,
     /// `ġ`
     pub rate: T,
-    /// The sizes of the terms of its value.
+    /// The magnitude of the terms of its value.
     term_magnitude: T,
 }
 
 impl<M: Dae, T: Real> EventFunctionPoint<M, T> {
-    /// Whether the function is zero to the rounding of its terms, and of a time of this size.
+    /// Whether the function is zero, to the rounding of its terms and of a time of this magnitude.
     pub fn is_zero(&self, time: T) -> bool {
         let size = self.term_magnitude + (self.rate * time).abs();
         self.value.abs() <= T::from_f64(ZERO_TOLERANCE_ROUNDOFFS * T::EPSILON) * size
@@ -38,7 +38,7 @@ impl<M: Dae, T: Real> EventFunctionPoint<M, T> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// The function of an event where `(ẋ, z)` is `y`.
+    /// The event function at the point with `y = (ẋ, z)`.
     ///
     /// # Errors
     /// A value that is not finite; no derivatives of `z`.
@@ -67,7 +67,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(EventFunctionPoint { value, gradient, rate, term_magnitude: terms })
     }
 
-    /// `g_w + g_z z_w` in the place of `(g_z, g_w)`.
+    /// Replaces `(g_z, g_w)` by `(0, g_w + g_z z_w)`.
     fn eliminate_algebraic_states(
         &mut self,
         gradient: &mut ArrayV<M, T>,
@@ -96,9 +96,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// `g_z ∂z/∂t`, a central difference: models have no derivative by the time. It is zero where
-    /// the model does not depend on it; elsewhere derivatives of the event are refused, and what
-    /// locates it needs no more than half of the digits.
+    /// `g_z ∂z/∂t` by a central difference, since models have no derivative with respect to time.
+    /// It is zero if the model does not depend on time. Otherwise derivatives of the event are
+    /// refused, and its location needs half of the digits only.
     fn algebraic_time_derivative(
         &mut self,
         k: usize,
@@ -119,7 +119,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(sum / (delta + delta))
     }
 
-    /// Whether the equations are others at other times near `t`: then how far apart these are.
+    /// The distance of the times used, if the equations differ at other times near `t`.
     pub(super) fn depends_on_time(&self, k: usize, x: &VectorX<M, T>, y: &ArrayK<M, T>, t: T) -> Option<T> {
         let nx = M::Shape::NX;
         let length = self.segments.get(k).map_or(T::ZERO, |at| (at.span.end - at.span.start).abs());
@@ -140,7 +140,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         (residual(t - delta) != residual(t + delta)).then_some(delta)
     }
 
-    /// The value of the function of an event at a state.
+    /// The value of an event function at a state.
     pub(super) fn event_function_value(
         &mut self,
         k: usize,

@@ -1,4 +1,4 @@
-//! Derivatives over the parts between events, forwards.
+//! Forward sensitivities over the segments between events.
 
 use super::*;
 use crate::integrator::chain_rule::{chain_states, fill_matrix, set_identity};
@@ -6,8 +6,8 @@ use crate::memory::allocate;
 use crate::result::Forward;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Derivatives of all steps and over all events, and what is known about the moments of these;
-    /// for `second` derivatives, what these need.
+    /// Computes the derivatives of all steps and events, and the linearisation of the events; for
+    /// second derivatives (`second`) also their data.
     #[allow(clippy::type_complexity)]
     pub(super) fn forward_sweep(
         &mut self,
@@ -33,7 +33,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let mut own = core::mem::take(&mut segment.start_sensitivities);
             history.clear();
             let (mut frozen, state, memory, _) = segment.load(integrator)?;
-            // Its derivatives by where a segment begins are multiplied by those of that.
+            // Chain rule: its derivatives with respect to the start of the segment times the
+            // derivatives of that start.
             let mut part = chain_rule_integrand(&mut along, Some(&*v), false);
             frozen.forward::<B>(
                 state,
@@ -85,7 +86,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 }
 
-/// The parts of a row over `(x₀, u, p)`.
+/// The parts of a row with respect to `(x₀, u, p)`.
 fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let mut gradient =
@@ -96,7 +97,7 @@ fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
     gradient
 }
 
-/// The derivatives over a segment alone, row by row.
+/// The derivatives of one segment, row by row.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]

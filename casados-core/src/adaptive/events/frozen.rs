@@ -1,5 +1,5 @@
-//! Steps and events that are kept: each part between two events has the same steps, relative to its
-//! length, and ends where its event happens now.
+//! Frozen steps and events: each segment keeps the relative lengths of its steps, and ends at the
+//! present time of its event.
 
 use super::detection::MAX_NEWTON_ITERATIONS;
 use super::evaluate::check_finite;
@@ -13,20 +13,20 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Following calls keep the steps and the events of the last successful one, whatever they are
-    /// given: one smooth function of `x₀`, `u` and `p`, solved to rounding. Their interval has to
-    /// be the same, unless an event ends it before.
+    /// Freezes the steps and events of the last successful call: later calls repeat them for all
+    /// inputs. They are a smooth function of `x₀`, `u` and `p`, solved to rounding. The interval
+    /// has to be the same, unless an event ends it earlier.
     ///
-    /// Times of events still depend on everything, and the steps between two events are stretched
-    /// with the time between them. Events that happened at one time have to do so still. That
-    /// events happen in this order, once each, and others do not, is not looked at again.
-    /// Derivatives at events are those of the solution, as without it: they belong to this function
-    /// up to the errors of its steps.
+    /// Times of events still depend on all inputs, and the steps between two events are scaled with
+    /// the time between them. Simultaneous events have to remain simultaneous. The order of the
+    /// events is not checked again, and new events are not detected. Derivatives at events are
+    /// those of the solution, as without freezing; they equal those of the frozen function up to
+    /// the local errors of its steps.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following
-    /// calls [`Error::OutsideInterval`], if they ask for another interval, and
-    /// [`Error::StepSizeUnderflow`], if an event cannot be found anymore.
+    /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Later calls
+    /// return [`Error::OutsideInterval`] for another interval, and [`Error::StepSizeUnderflow`] if
+    /// an event no longer exists.
     pub fn freeze(&mut self) -> Result<(), Error> {
         let asked = self.requested_span.ok_or(Error::NoResult)?;
         if self.segment_count == 0 {
@@ -40,15 +40,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// Following calls choose steps and look for events again.
+    /// Ends the effect of [`freeze`](Self::freeze): later calls choose steps and detect events.
     pub fn thaw(&mut self) {
         self.frozen_span = None;
     }
 
-    /// All parts, with the events that are kept.
+    /// Solves all segments with the frozen events.
     ///
     /// # Errors
-    /// See [`Hybrid::freeze`]; those of Newton's method.
+    /// See [`Hybrid::freeze`]; the errors of Newton's method.
     pub(super) fn solve_frozen_events(
         &mut self,
         x0: &VectorX<M, T>,
@@ -96,7 +96,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// The steps of a part between other times, solved.
+    /// Solves the steps of a segment, scaled to new times.
     fn solve_stretched_segment(&mut self, k: usize, start: T, end: T) -> Result<(), Error> {
         let Self { integrator, segments, solution, .. } = self;
         let Some(segment) = segments.get_mut(k) else { return Ok(()) };
@@ -111,8 +111,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// The time of the event that ends a part: by Newton's method for its length, from the one that
-    /// is kept.
+    /// The time of the event that ends a segment: Newton's method for the length of the segment,
+    /// from the frozen length.
     fn solve_event_time(&mut self, k: usize, event: &Event<M, T>, start: T) -> Result<T, Error> {
         let Some((kept, u)) = self.segments.get(k).map(|segment| (segment.frozen_span, segment.u)) else {
             return Err(Error::NoResult);
@@ -126,7 +126,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let y = self.consistent_derivatives(&x, &u, t)?;
             let guard = self.event_function_at(k, event, (&x, &u, t), &y)?;
             if whole == T::ZERO {
-                // It happened at the time of the event before it, and does so still.
+                // A simultaneous event has to remain one.
                 if guard.is_zero(t) {
                     return Ok(t);
                 }
@@ -140,7 +140,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 return Ok(t);
             }
             (length, last) = (length + change, change.abs());
-            // In the same direction still.
+            // The length keeps its sign.
             if !(length / whole > T::ZERO && length.is_finite()) {
                 break;
             }

@@ -1,10 +1,11 @@
-//! Derivatives over an event, forwards and backwards.
+//! Derivatives across an event, forward and adjoint.
 
 use super::evaluate::dot;
 use super::*;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// `V⁻` becomes `V⁺`, or the derivative of the last state; the derivative of the time.
+    /// Replaces `V⁻` by `V⁺`, or by the derivative of the final state; writes the derivative of the
+    /// time.
     pub(super) fn forward_over_jump(
         &mut self,
         event: Event<M, T>,
@@ -40,8 +41,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(time)
     }
 
-    /// Shows an integrand what is before an event, and with the sign of a lower limit what is after
-    /// it.
+    /// Evaluates an integrand before the event and, with the sign of a lower limit, after it.
     pub(super) fn integrand_at_jump(
         &mut self,
         k: usize,
@@ -67,8 +67,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// `λ⁺` becomes `λ⁻`; `κ = −σ/ġ`. `density` is what an integrand gains where the event is
-    /// later.
+    /// Replaces `λ⁺` by `λ⁻`; returns `κ = −σ/ġ`. `density` is the derivative of the integral with
+    /// respect to the time of the event.
     pub(super) fn adjoint_over_jump(
         &mut self,
         k: usize,

@@ -1,7 +1,7 @@
 //! Integration with events: zero crossings of functions, located by dense output and then to
-//! rounding, where the integration ends or the state jumps, with the jump of the sensitivities.
+//! rounding, at which the integration ends or the state jumps, with the jump of the sensitivities.
 //!
-//! At the time `t*(w)` of an event, with `f⁻` and `f⁺` the derivatives of the state on both sides:
+//! At the time `t*(w)` of an event, with the derivatives `f⁻` and `f⁺` of the state on both sides:
 //!
 //! ```text
 //! dt*/dw = −(g_x V⁻ + g_w)/ġ        ġ = g_x f⁻ + g_t        dx(t*)/dw = V⁻ + f⁻ dt*/dw
@@ -9,9 +9,9 @@
 //! λ⁻ = j_xᵀ λ⁺ − (σ/ġ) g_x        λ_w += j_wᵀ λ⁺ − (σ/ġ) g_w        σ = λ⁺ᵀ (j_x f⁻ + j_t − f⁺)
 //! ```
 //!
-//! `second` differentiates them once more, `frozen` keeps steps and events. Between events
-//! derivatives are those of the steps that were taken. At events they are those of the solution: a
-//! step's derivative by its length is `ẋ`, but for the error of the step.
+//! `second_order` differentiates them once more, `frozen` repeats steps and events. Between events
+//! derivatives are those of the accepted steps. At events they are those of the solution: the
+//! derivative of a step with respect to its length is `ẋ`, up to the local error.
 
 mod accumulation;
 mod detection;
@@ -76,61 +76,60 @@ use bytemuck::Zeroable;
 /// # Ok::<(), casados::Error>(())
 /// ```
 ///
-/// **Events at one time.** Events happen where the solution brings their functions to zero. All
-/// functions that are zero at the same time, to rounding, happen there in the order of the list;
-/// each is looked at again after the jumps before it, and happens if it is still zero. An event
-/// that ends the integration ends it before those behind it in the list. What a jump takes from one
-/// side of zero to the other does not happen, and neither does what is zero at the start: a
-/// function that begins at zero is on the side to which it goes.
+/// **Simultaneous events.** Events happen where the solution brings their functions to zero. All
+/// functions that are zero at the same time, to rounding, happen in the order of the list. Each is
+/// evaluated again after the jumps before it, and happens if it is still zero. A terminal event
+/// ends the integration before the later events of the list. A sign change caused by a jump is not
+/// an event, and neither is a zero at the start: a function that starts at zero has the sign that
+/// it takes next.
 ///
-/// **Algebraic states.** Functions may look at `z`; jumps change `x` alone. Of such an event
-/// derivatives follow by the theorem of implicit functions, first ones, where the equations of the
-/// model do not depend on the time.
+/// **Algebraic states.** Event functions may depend on `z`; jumps change only `x`. The first
+/// derivatives of such an event follow from the implicit function theorem, if the equations of the
+/// model do not depend on time.
 ///
-/// All calls take the length `h` of the interval, as those of the integrator. Times of events are
-/// times as the model sees them, and so is that of [`dense`](Self::dense).
+/// All calls take the length `h` of the interval, as those of the integrator. Times of events, and
+/// the argument of [`dense`](Self::dense), are absolute: the time `t` of the model.
 ///
-/// Later calls of a kind do not allocate, but for the lists that results of derivatives own.
+/// Repeated calls of one kind allocate only the lists that results of derivatives own.
 ///
 /// # Errors
-/// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too;
-/// [`Error::TooManyEvents`]; [`Error::AccumulatingEvents`] where they come sooner and sooner;
-/// [`Error::TooManySteps`] of all steps of a call; [`Error::NonFiniteFunction`] of an event or a
-/// jump. Of calls with derivatives [`Error::Grazing`]: the time of the event has no derivative; and
-/// [`Error::DependsOnTime`] of a function of `z`.
+/// Every call: the errors of [`Integrator`]; [`Error::InconsistentStart`], also after a jump;
+/// [`Error::TooManyEvents`]; [`Error::AccumulatingEvents`] if the times between events shrink to
+/// zero; [`Error::TooManySteps`] for the sum of steps of a call; [`Error::NonFiniteFunction`] of an
+/// event function or jump. Calls with derivatives: [`Error::Grazing`] if the time of the event has
+/// no derivative, and [`Error::DependsOnTime`] for an event function of `z`.
 pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     events: Box<[Event<M, T>]>,
-    /// More events than these are an error.
+    /// The maximum number of events in a call.
     max_events: usize,
     segments: Vec<Segment<M, T>>,
-    /// How many of them belong to the last successful call.
+    /// The number of segments of the last successful call.
     segment_count: usize,
-    /// The interval that the last call was asked for, if it succeeded, and that of steps and events
-    /// that are kept.
+    /// The interval of the last call, if it succeeded, and that of the frozen steps and events.
     requested_span: Option<Span<T>>,
     frozen_span: Option<Span<T>>,
     statistics: AdaptiveStatistics,
     solution: Solution<M, T>,
-    /// Where a function is evaluated.
+    /// The variables at which functions are evaluated.
     variables: Box<ArrayV<M, T>>,
-    /// On which side of zero each function was, and its value behind that.
+    /// The sign of each function, followed by its value.
     function_signs: Vec<f64>,
     function_values: Vec<f64>,
-    /// The events that happen where the last segment ended, in the order of the list.
+    /// The events at the end of the last segment, in the order of the list.
     pending_events: Vec<usize>,
-    /// What is known about the moments of the events of a call.
+    /// The linearised events of a call.
     linearised_events: LinearisedEvents<M, T>,
-    /// Derivatives over the parts up to now, and memory for the next ones.
+    /// The derivatives over the segments so far, and memory for those over the next one.
     sensitivities: Option<[Box<StateSensitivities<M, T>>; 2]>,
-    /// Memory of second derivatives.
+    /// Memory for second derivatives.
     second_order: Option<Box<second_order::SecondOrderMemory<M, T>>>,
 }
 
 /// The events of a call that happened, in order.
 type LinearisedEvents<M, T> = Vec<(Event<M, T>, EventLinearisation<M, T>)>;
 
-/// What is known about the moment of an event.
+/// The linearisation of an event.
 struct EventLinearisation<M: Dae, T: Real> {
     /// `g_v`, and `ġ`.
     function_gradient: ArrayV<M, T>,
@@ -141,8 +140,8 @@ struct EventLinearisation<M: Dae, T: Real> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Of an integrator, which keeps its options, tolerances, parameters and start time; at most a
-    /// thousand events may happen in a call.
+    /// Adds events to an integrator, which keeps its options, tolerances, parameters and start
+    /// time; the limit is a thousand events in a call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -174,18 +173,18 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self.integrator
     }
 
-    /// More events in one call are the error `TooManyEvents`.
+    /// Sets the maximum number of events in one call; more are the error `TooManyEvents`.
     pub fn set_most_events(&mut self, most: usize) {
         self.max_events = most;
     }
 
-    /// What the last call did to choose its steps, between all events.
+    /// Statistics of the step selection of the last call, over all segments.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
     }
 
-    /// The solution at the end, and the events.
+    /// Integrates; returns the solution at the end and the events.
     ///
     /// # Errors
     /// See [`Hybrid`].
@@ -194,8 +193,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(&self.solution)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last call;
-    /// where it jumps, that before.
+    /// The solution at the model's time `t` within the interval of the last call; at a jump, the
+    /// solution before it.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`],
@@ -206,7 +205,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         dense_at(integrator, segments.get_mut(..*count).unwrap_or_default(), &solution.nominal, t)
     }
 
-    /// The solution at the end, and its derivatives and those of the times of the events.
+    /// Integrates with forward sensitivities; returns the solution at the end, its derivatives, and
+    /// those of the times of the events.
     ///
     /// # Errors
     /// See [`Hybrid`].
@@ -233,7 +233,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(result)
     }
 
-    /// The solution at the end, and the gradient of `λᵀx`.
+    /// Integrates with the adjoint; returns the solution at the end and the gradient of `λᵀx`.
     ///
     /// # Errors
     /// See [`Hybrid`].
@@ -247,7 +247,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
 
-    /// As [`Hybrid::solve`], with an integrand: the steps are taken again, to rounding.
+    /// As [`Hybrid::solve`], with an integrand: the steps are replayed, solved to rounding.
     pub(super) fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
@@ -261,7 +261,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(&self.solution)
     }
 
-    /// All steps again, to rounding, and what is known about the moments of the events.
+    /// Replays all steps, solved to rounding, and linearises the events.
     fn replay_steps(
         &mut self,
         x0: &VectorX<M, T>,
@@ -334,7 +334,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(result)
     }
 
-    /// The solution at the end, from the segment that was integrated last.
+    /// Collects the solution at the end from the last segment.
     fn collect_solution(&mut self) {
         let result = &self.integrator.workspace.result;
         let Solution { nominal, terminal, occurrences, .. } = &mut self.solution;

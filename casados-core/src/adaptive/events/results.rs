@@ -1,4 +1,4 @@
-//! What calls with events return.
+//! Results of integrations with events.
 
 use super::*;
 use crate::finite::check_gradient;
@@ -27,17 +27,18 @@ use crate::finite::check_gradient;
 /// ```
 #[non_exhaustive]
 pub struct Occurrence<M: Dae, T: Real = f64> {
-    /// Which.
+    /// The index of the event in the list.
     pub event: usize,
-    /// The time at which it happened: that of the model, not since the start of the interval.
+    /// The time of the event: the time `t` of the model, not the time since the start of the
+    /// interval.
     pub t: T,
-    /// The state before it.
+    /// The state before the event.
     pub before: VectorX<M, T>,
-    /// The state after it.
+    /// The state after the event.
     pub after: VectorX<M, T>,
 }
 
-/// The solution at the end, and what happened before.
+/// The solution at the end, and the events.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -60,17 +61,17 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 pub struct Solution<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
-    /// The time at the end: that of the interval, or the time of the event that ended the
+    /// The time at the end: the end of the interval, or the time of the event that ended the
     /// integration.
     pub t: T,
-    /// Whether an event ended it: the last of the occurrences.
+    /// Whether an event ended the integration: the last of the occurrences.
     pub terminal: bool,
-    /// The events, one after the other.
+    /// The events, in order of time.
     pub occurrences: Vec<Occurrence<M, T>>,
 }
 
-/// The solution at the end and its derivatives; if an event ended the integration, with the change
-/// of its time.
+/// The solution at the end and its derivatives; if an event ended the integration, they include the
+/// derivative of its time.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -100,7 +101,7 @@ pub struct HybridForward<M: Dae, T: Real = f64> {
     pub dx_du: MatrixXU<M, T>,
     /// `∂x/∂p`
     pub dx_dp: MatrixXP<M, T>,
-    /// Of the time of each event: its derivatives with respect to `x₀`, `u` and `p`.
+    /// The derivatives of the time of each event with respect to `x₀`, `u` and `p`.
     pub times: Vec<TimeGradient<M, T>>,
 }
 

@@ -1,7 +1,7 @@
-//! Second derivatives over events: the jump of the sensitivities, differentiated once more.
+//! Second derivatives across events: the derivative of the jump of the sensitivities.
 //!
-//! An event is the map `S(x⁻, w) = F⁺(−τ, j(F⁻(τ, x⁻)))`: along the flow to where `g = 0`, then the
-//! jump, and the flow behind it back to the same time. With `κ = −σ/ġ` and `λ⁻ = j_xᵀ λ⁺ + κ g_x`
+//! An event is the map `S(x⁻, w) = F⁺(−τ, j(F⁻(τ, x⁻)))`: the flow up to `g = 0`, then the jump,
+//! then the flow after the jump back to the same time. With `κ = −σ/ġ` and `λ⁻ = j_xᵀ λ⁺ + κ g_x`
 //! of the adjoint, all at the event:
 //!
 //! ```text
@@ -10,7 +10,8 @@
 //! b = λ⁻ᵀ df⁻/d(x, w)      c = λ⁺ᵀ df⁺/d(x, w)      e = b − c_x S' − (0, c_w)
 //! ```
 //!
-//! Here nothing depends on the time: neither models nor functions have second derivatives by it.
+//! Nothing here depends on time: models and functions have no second derivatives with respect to
+//! it.
 
 use super::evaluate::dot;
 use super::{Event, EventLinearisation, Hybrid, HybridAdjoint, HybridForward};
@@ -80,26 +81,28 @@ listed!([M: Dae, T: Real] HybridHessian<M, T> { forward, adjoint, h_xx, h_xu, h_
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 pub(super) struct SecondOrderMemory<M: Dae, T: Plain> {
-    /// The Hessian over the state that was reached, `u` and `p`, and one in the making.
+    /// The Hessian with respect to the reached state, `u` and `p`, and the next one under
+    /// construction.
     hessian: FullHessian<M, T>,
     sum: FullHessian<M, T>,
     product: FullHessian<M, T>,
-    /// `S'`, and `E` of all variables.
+    /// `S'`, and `E` for all variables.
     jump_sensitivities: [StateSensitivities<M, T>; 2],
     variable_sensitivities: ArrayV<M, ArrayW<M, T>>,
-    /// Derivatives of `ẋ`, a row for each direction.
+    /// Derivatives of `ẋ`, one row for each direction.
     rate_derivatives: ArrayW<M, ArrayX<M, T>>,
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    /// Integrates with second derivatives; returns the solution at the end, its derivatives, and
+    /// the gradient and Hessian of `λᵀx`.
     ///
-    /// Between events second derivatives are those of the steps that were taken, at events those of
-    /// the solution.
+    /// Between events second derivatives are those of the accepted steps, at events those of the
+    /// solution.
     ///
     /// # Errors
-    /// See [`Hybrid`]; [`Error::DependsOnTime`] if at an event the model, its function or its jump
-    /// does: a clock that is a state (`ẋ = 1`) says the same.
+    /// See [`Hybrid`]; [`Error::DependsOnTime`] if the model, the event function or the jump
+    /// depends on time at an event: add time as a state (`ẋ = 1`).
     pub fn hessian(
         &mut self,
         x0: &VectorX<M, T>,
@@ -155,7 +158,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         if let Some((index, _)) = find_non_finite(ArrayW::<M, T>::flat(h)) {
             return Err(Error::Overflow { step: 0, index });
         }
-        // To the last bit symmetric: of the two that differ by rounding the lower one.
+        // Exactly symmetric: the lower triangle is used, since both differ by rounding.
         let at = |r: usize, c: usize| h[r.max(c)][r.min(c)];
         let mut result = HybridHessian {
             forward,
@@ -178,7 +181,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(result)
     }
 
-    /// `H⁺` becomes `H⁻`, with `λ⁺` and `λ⁻`.
+    /// Replaces `H⁺` by `H⁻`, given `λ⁺` and `λ⁻`.
     fn hessian_over_jump(
         &mut self,
         k: usize,
@@ -199,7 +202,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             variable_sensitivities: e,
             rate_derivatives: slopes,
         } = second;
-        // S' and τ' from the identity.
+        // `S'` and `τ'`, starting from the identity.
         s.iter_mut().for_each(set_identity::<M, T>);
         let [v, next] = s.each_mut().map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
         let time = self.forward_over_jump(event, moment, v, next)?;
@@ -232,7 +235,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         if let Some(jump) = event.jump {
             jump.hessian(&self.variables, lambda.as_slice(), &mut curve);
         }
-        // What the slopes change by.
+        // The changes of the slopes.
         let Some(at) = self.solution.occurrences.get(k) else { return Ok(()) };
         let u = self.segments.get(k).map_or_else(Zeroable::zeroed, |segment| segment.u);
         let base = &mut self.integrator.workspace;
@@ -260,7 +263,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// Nothing at an event is another at other times, to the last bit.
+    /// Tests that the model and the functions of an event are autonomous: bitwise equal at other
+    /// times.
     ///
     /// # Errors
     /// [`Error::DependsOnTime`]

@@ -1,12 +1,12 @@
-//! Events that happen at one time.
+//! Simultaneous events.
 //!
-//! 1. The earliest crossing of a step is located: where another function has crossed zero before
-//!    it, that one.
+//! 1. The earliest crossing of a step is located; if another function has crossed zero before it,
+//!    that one instead.
 //! 2. All functions that are zero at this time, to the rounding of the time and of their terms, and
-//!    go to the side that their crossing asks for, happen.
-//! 3. They happen in the order of the list. Each is looked at again after the jumps before it, and
+//!    change sign in the direction of their `Crossing`, happen.
+//! 3. They happen in the order of the list. Each is evaluated again after the jumps before it, and
 //!    happens if its function is still zero.
-//! 4. What a jump itself takes from one side of zero to the other is no crossing.
+//! 4. A sign change caused by a jump is not a crossing.
 
 use super::{Hybrid, Occurrence};
 use crate::adaptive::engine::Engine;
@@ -22,8 +22,8 @@ use crate::shape::{Matrix, Shape};
 use super::evaluate::check_finite;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// The last step of a segment ends where the earliest of the events is that cross zero in it,
-    /// one of which was found near `t`. Notes all that are zero then; when that is.
+    /// Ends the last step of a segment at the earliest event in it, given an event found near `t`.
+    /// Records all events that are zero there; returns their time.
     pub(super) fn locate_earliest_event(
         &mut self,
         k: usize,
@@ -43,8 +43,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(t)
     }
 
-    /// Notes the events that happen where a segment ends, `index` among them; one that has happened
-    /// before, if there is one.
+    /// Records the events at the end of a segment, `index` among them; returns an event that
+    /// happened earlier, if any.
     fn find_simultaneous_events(
         &mut self,
         k: usize,
@@ -81,13 +81,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(None)
     }
 
-    /// What the time is rounded relative to.
+    /// The magnitude of times, for their rounding errors.
     fn time_magnitude(&self, k: usize, t: T) -> T {
         let last = self.segments.get(k).and_then(|segment| segment.tape.entries().last());
         t.abs() + last.map_or(T::ZERO, |entry| entry.h.abs())
     }
 
-    /// The events that were noted happen at the end of the last segment: the state after them, or
+    /// Applies the recorded events at the end of the last segment; returns the state after them, or
     /// nothing if one of them ends the integration.
     pub(super) fn apply_pending_events(
         &mut self,
@@ -120,7 +120,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             push(occurrences, Occurrence { event: index, t, before: x, after: x })?;
             self.check_accumulation(index)?;
             let Some(jump) = event.jump else {
-                // Where the state is, `z` is that of the equations there.
+                // `z` is consistent with the new state.
                 self.solution.nominal.x = x;
                 self.solution.nominal.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
                 (self.solution.t, self.solution.terminal) = (t, true);
@@ -132,7 +132,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             if let Some(occurrence) = self.solution.occurrences.get_mut(k) {
                 occurrence.after = x;
             }
-            // The side of the solution on which the next steps begin.
+            // The branch of the solution on which the next steps start.
             let parameters = self.integrator.workspace.parameters;
             let mut y = y;
             self.integrator.consistent.solve(&ModelPoint { x: &x, u, p: &parameters, t }, &mut y)?;
@@ -141,7 +141,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(Some(x))
     }
 
-    /// A segment between two events at one time.
+    /// Adds a segment of length zero between two simultaneous events.
     fn push_empty_segment(&mut self, x: &VectorX<M, T>, u: &VectorU<M, T>, t: T) -> Result<usize, Error> {
         let k = self.segment_count;
         if self.segments.len() <= k {

@@ -1,4 +1,4 @@
-//! The calls that all integrators have in common, with an integrand or without.
+//! The calls that all integrators have in common, with and without an integrand.
 
 use super::*;
 use crate::memory::Heap;

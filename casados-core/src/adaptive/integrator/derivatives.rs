@@ -3,19 +3,19 @@
 use super::*;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
-    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`: of the steps that were
-    /// taken, exactly.
+    /// The solution and its derivatives with respect to `x₀`, `u` and `p`: exact derivatives of the
+    /// accepted steps.
     ///
-    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to
-    /// rounding, each from where the run took it.
+    /// The steps are chosen as in [`Integrator::solve`]; then their stages are solved to rounding,
+    /// each step from the accepted state, and differentiated.
     ///
     /// # Errors
-    /// See [`Integrator`]; those of Newton's method with steps that are kept.
+    /// See [`Integrator`]; the errors of Newton's method in the repeated steps.
     pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
         self.forward_with_quadrature(x0, u, h, None)
     }
 
-    /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as
+    /// The solution and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`, of the steps as in
     /// [`Integrator::forward`].
     ///
     /// # Errors
@@ -30,7 +30,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
 
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as
+    /// The solution, its derivatives, and the gradient and Hessian of `λᵀx`, of the steps as in
     /// [`Integrator::forward`].
     ///
     /// # Errors

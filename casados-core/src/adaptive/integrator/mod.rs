@@ -1,4 +1,4 @@
-//! The adaptive integrator as its users see it.
+//! The public adaptive integrator.
 
 mod calls;
 mod derivatives;
@@ -28,18 +28,18 @@ use core::marker::PhantomData;
 /// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
 ///
 /// All calls take the state at the start of the interval, the control, and the length `h` of the
-/// interval, as those of [`Irk`](crate::Irk) and [`Erk`](crate::Erk) do; it may be negative or
-/// zero. The interval begins at the time of [`set_time`](Self::set_time). Times that are asked for
-/// or returned, as in [`dense`](Self::dense), are times, not distances from the start. All calls
-/// return a reference to results in the memory of the integrator.
+/// interval, as those of [`Irk`](crate::Irk) and [`Erk`](crate::Erk); `h` may be negative or zero.
+/// The interval starts at the time of [`set_time`](Self::set_time). Times in arguments and results,
+/// as in [`dense`](Self::dense), are absolute. All calls return a reference to results in the
+/// memory of the integrator.
 ///
 /// # Errors
-/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`];
-/// [`Error::InconsistentStart`] if there are no consistent `ẋ` and `z` at the start,
-/// [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the model has no
-/// finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
-/// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until
-/// a call succeeds there is no dense output and nothing to be frozen, [`Error::NoResult`].
+/// Every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::InconsistentStart`]
+/// if there are no consistent `ẋ` and `z` at the start, [`Error::Singular`] if no step can be
+/// solved; [`Error::NonFiniteModel`] if the model is not finite at a point of the solution;
+/// [`Error::StepSizeUnderflow`], [`Error::TooManySteps`]; [`Error::OutOfMemory`]. After an error
+/// the integrator remains usable, and frozen steps remain frozen; until a call succeeds, dense
+/// output and freezing return [`Error::NoResult`].
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -60,7 +60,7 @@ pub struct Integrator<M: Dae, B: MethodState<M, T>, T: Real> {
     pub(super) workspace: Box<Workspace<M, T>>,
     pub(super) consistent: Consistent<M, T>,
     pub(super) method_state: B::State,
-    /// Derivatives, if they take part in the choice of the steps.
+    /// Sensitivities, if they are error controlled.
     sensitivities: Option<Box<Variational<M, T>>>,
     pub(super) tape: Tape<T>,
     pub(super) statistics: AdaptiveStatistics,
@@ -70,16 +70,17 @@ pub struct Integrator<M: Dae, B: MethodState<M, T>, T: Real> {
     last_span: Option<Span<T>>,
     frozen: Option<FrozenSteps<M, B, T>>,
     pub(super) derivative_memory: Option<Box<SensitivityMemory<M, T>>>,
-    /// Derivatives at the start of each step.
+    /// Sensitivities at the start of each step.
     step_sensitivities: Vec<T>,
     method: PhantomData<fn() -> B>,
 }
 
-/// Steps that are kept for following calls.
+/// Steps that later calls repeat.
 struct FrozenSteps<M: Dae, B: MethodState<M, T>, T: Real> {
     /// Their interval.
     span: Span<T>,
-    /// Takes them without derivatives. Programs that keep no steps have no integrator for that.
+    /// Repeats the steps without derivatives. A function pointer: programs that freeze no steps do
+    /// not contain it.
     solve_frozen: SolveFrozen<M, B, T>,
 }
 
@@ -87,7 +88,7 @@ type SolveFrozen<M, B, T> =
     fn(&mut Integrator<M, B, T>, &VectorX<M, T>, &VectorU<M, T>, T) -> Result<Span<T>, Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
-    /// An integrator with its memory on the heap.
+    /// Creates an integrator with its memory on the heap.
     ///
     /// # Errors
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
@@ -123,20 +124,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &self.options
     }
 
-    /// What the last call did to choose its steps, successful or not.
+    /// Statistics of the step selection of the last call, successful or not.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
     }
 
-    /// The times between the accepted steps of the last call, the start first, if steps are
-    /// remembered.
+    /// The start and the end times of the accepted steps of the last call, if
+    /// [`AdaptiveOptions::keep_steps`] is set.
     pub fn times(&self) -> impl Iterator<Item = T> {
         let end = self.last_span.map(|span| span.end);
         self.tape.entries().iter().map(|entry| entry.t).chain(end)
     }
 
-    /// `x` and `z` at the end of an interval of length `h`, and the consistent `z` at its start.
+    /// Integrates over an interval of length `h`; returns `x` and `z` at its end, and the
+    /// consistent `z` at its start.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -163,13 +165,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.workspace.result)
     }
 
-    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times,
-    /// which lie between the start `t` and `t + h`, while the integration passes them; steps need
-    /// not be remembered for it.
+    /// As [`Integrator::solve`]; during the integration `output` is called with the solution at
+    /// each of these times, which are between the start `t` and `t + h`. It does not need
+    /// [`AdaptiveOptions::keep_steps`].
     ///
     /// # Errors
-    /// See [`Integrator`]; [`Error::Unordered`] of a time that is outside or before the one that
-    /// precedes it.
+    /// See [`Integrator`]; [`Error::Unordered`] if a time is outside of the interval or before the
+    /// preceding one.
     pub fn solve_at(
         &mut self,
         x0: &VectorX<M, T>,
@@ -205,7 +207,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             }
             Ok(())
         })?;
-        // Of an interval without length.
+        // An interval of length zero.
         let Workspace { result, dense, .. } = &mut *self.workspace;
         (dense.x, dense.z) = (result.x, result.z);
         for t in times {
@@ -215,10 +217,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.workspace.result)
     }
 
-    /// The solution at the time `t`, as the model sees it: inside the interval of the last call.
+    /// Dense output: the solution at the model's time `t` within the interval of the last call.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if that call failed or steps are not remembered;
+    /// [`Error::NoResult`], also if that call failed or steps are not kept;
     /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check_input(Argument::T, &[t])?;
@@ -226,7 +228,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.dense_in(span, t)
     }
 
-    /// The solution at a time inside the interval whose steps are on the tape.
+    /// The solution at a time within the interval whose steps are on the tape.
     pub(super) fn dense_in(&mut self, span: Span<T>, t: T) -> Result<&Dense<M, T>, Error> {
         if !is_inside_interval(t, span.start, span.end) {
             let (t, start, end) = (t.to_f64(), span.start.to_f64(), span.end.to_f64());
@@ -245,12 +247,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(dense)
     }
 
-    /// Following calls take the steps of the last successful one, whatever they are given, and
-    /// solve them to rounding: one smooth function of `x₀`, `u` and `p`. Their interval has to be
-    /// the same.
+    /// Freezes the steps of the last successful call: later calls repeat them for all inputs and
+    /// solve them to rounding. They are a smooth function of `x₀`, `u` and `p`. The interval has to
+    /// be the same.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if steps were not remembered.
+    /// [`Error::NoResult`], also if steps were not kept.
     pub fn freeze(&mut self) -> Result<(), Error> {
         let span = self.last_span.ok_or(Error::NoResult)?;
         if self.tape.entries().is_empty() && span.start != span.end {
@@ -260,7 +262,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The steps that are kept, without derivatives.
+    /// Solves the frozen steps, without derivatives.
     fn solve_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
         let span = self.begin_frozen_call(x0, u, h)?;
         let Self { workspace: base, consistent, tape, method_state: state, .. } = self;
@@ -277,16 +279,16 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(span)
     }
 
-    /// Following calls choose their steps again.
+    /// Ends the effect of [`freeze`](Self::freeze): later calls choose their steps.
     pub fn thaw(&mut self) {
         self.frozen = None;
     }
 
-    /// The end of an interval of this length.
+    /// The end of an interval of length `h`.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
-    /// resolve.
+    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] for a length below the rounding of
+    /// the time.
     pub(super) fn interval_end(&self, h: T) -> Result<T, Error> {
         check_input(Argument::H, &[h])?;
         let end = self.start_time + h;
@@ -297,7 +299,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(end)
     }
 
-    /// What every call begins with.
+    /// Checks and copies the inputs of a call.
     fn begin_call(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
         check_model_input::<M, T>(Argument::X0, x0.as_slice())?;
@@ -310,7 +312,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(Span { start: self.start_time, end: t_end })
     }
 
-    /// Memory of derivatives.
+    /// Allocates the memory of derivatives.
     pub(super) fn allocate_derivatives(&mut self) -> Result<(), Error> {
         if self.derivative_memory.is_none() {
             self.derivative_memory = Some(allocate()?);
@@ -318,8 +320,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there
-    /// is no result.
+    /// Chooses the steps to be differentiated, or prepares the frozen ones. The result is invalid
+    /// until they are solved.
     fn prepare_steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
         self.last_span = None;
         self.allocate_derivatives()?;
@@ -330,7 +332,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.run_to(x0, u, t_end, true, |_, _| Ok(()))
     }
 
-    /// What a call with frozen steps begins with.
+    /// Begins a call with frozen steps.
     ///
     /// # Errors
     /// [`Error::OutsideInterval`] if the interval is not that of the frozen steps.
@@ -339,7 +341,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let span = self.begin_call(x0, u, t_end)?;
         let Some(FrozenSteps { span: frozen, .. }) = self.frozen else { return Ok(span) };
         frozen.check_same(span.start, span.end)?;
-        // Dense output of explicit methods takes steps again.
+        // Dense output of explicit methods repeats steps.
         let Workspace { point, u, parameters, .. } = &mut *self.workspace;
         write_inputs::<M, T>(point.as_mut(), u, parameters);
         Ok(span)
@@ -380,7 +382,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         ))
     }
 
-    /// There is a result, with derivatives.
+    /// Marks the result with derivatives as valid.
     fn finish_derivatives(&mut self, span: Span<T>) -> Result<&SensitivityMemory<M, T>, Error> {
         self.last_span = Some(span);
         self.derivative_memory
@@ -388,7 +390,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             .ok_or(Error::OutOfMemory { bytes: size_of::<SensitivityMemory<M, T>>() })
     }
 
-    /// Integrates to a time; there is a result as soon as the caller says so.
+    /// Integrates to a time. The caller marks the result as valid.
     pub(super) fn run_to(
         &mut self,
         x0: &VectorX<M, T>,
@@ -425,7 +427,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 }
 
-/// Whether a time lies in an interval of any direction.
+/// Whether a time is within an interval of either direction.
 pub(super) fn is_inside_interval<T: Real>(t: T, start: T, end: T) -> bool {
     if start <= end { start <= t && t <= end } else { end <= t && t <= start }
 }

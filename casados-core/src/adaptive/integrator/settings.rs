@@ -1,12 +1,12 @@
-//! What is set for all following calls.
+//! Settings for later calls.
 
 use super::*;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
-    /// The parameters `p` of all following calls.
+    /// Sets the parameters `p` of all later calls.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last parameters stay.
+    /// [`Error::NonFiniteInput`]; the previous parameters remain set.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         check_model_input::<M, T>(Argument::P, p.as_slice())?;
         self.workspace.parameters = *p;
@@ -14,21 +14,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The time at the start of the interval of all following calls; zero if never set.
+    /// Sets the time at the start of the interval of all later calls; initially zero.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last time stays.
+    /// [`Error::NonFiniteInput`]; the previous time remains set.
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
         check_input(Argument::T, &[t])?;
         self.start_time = t;
         Ok(())
     }
 
-    /// Start values `ẋ` and `z` from which consistent ones are found; if never set, the nominal
-    /// values of the model, [`Dae::START`]. Where there are several solutions they decide for one.
+    /// Sets the initial guess of `ẋ` and `z` for consistent initial values; initially the nominal
+    /// values of the model, [`Dae::START`]. It selects one of several solutions.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]: then the last values stay.
+    /// [`Error::NonFiniteInput`]; the previous values remain set.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         check_model_input::<M, T>(Argument::StartXdot, xdot.as_slice())?;
         check_model_input::<M, T>(Argument::StartZ, z.as_slice())?;
@@ -36,10 +36,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The relative tolerance of each state, instead of that of the options.
+    /// Sets the relative tolerance of each state, which replaces that of the options.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`]: then the last ones stay.
+    /// [`Error::InvalidOption`]; the previous tolerances remain set.
     pub fn set_relative_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for rtol in x.as_slice().iter().chain(z.as_slice()) {
             check_rtol::<T>(rtol.to_f64())?;
@@ -48,10 +48,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The absolute tolerance of each state, instead of that of the options.
+    /// Sets the absolute tolerance of each state, which replaces that of the options.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`]: then the last ones stay.
+    /// [`Error::InvalidOption`]; the previous tolerances remain set.
     pub fn set_absolute_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for atol in x.as_slice().iter().chain(z.as_slice()) {
             check_atol::<T>(atol.to_f64())?;
@@ -60,17 +60,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// Whether the derivatives of the solution take part in the choice of the steps of all
-    /// following calls: then a step is accepted if its estimated errors of the states and of every
-    /// column of `V = d(x, z)/d(x₀, u, p)` are below the tolerances.
+    /// Includes the sensitivities in the error control of all later calls: a step is accepted if
+    /// the estimated errors of the states and of every column of `V = d(x, z)/d(x₀, u, p)` are
+    /// below the tolerances.
     ///
-    /// Without it steps are chosen for the states, and derivatives are the exact ones of these
-    /// steps: those of the solution up to an error that need not follow the tolerance. The error of
-    /// `V_rc` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the magnitudes `s` of
-    /// [`Integrator::set_sensitivity_scales`]. Results are still exact derivatives of the steps
-    /// that are taken. Each step that the states accept is differentiated once more than without,
-    /// in every call that chooses steps, `solve` included; steps that are frozen cost nothing more.
-    /// Over several intervals, and between events, `V` begins as the identity in each.
+    /// Without it the states alone determine the steps, and derivatives are the exact ones of these
+    /// steps; their error relative to the derivatives of the solution need not follow the
+    /// tolerance. The error of `V_rc` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the
+    /// magnitudes `s` of [`Integrator::set_sensitivity_scales`]. Results remain the exact
+    /// derivatives of the accepted steps. Each step that the states accept is differentiated once
+    /// more, in every call that chooses steps, `solve` included; frozen steps have no extra cost.
+    /// With several intervals, and between events, `V` starts from the identity in each.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -85,12 +85,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The magnitudes of `x₀`, `u` and `p` by which errors of derivatives are measured, as `p̄` of
-    /// CVODES. For those that are zero, and if never set, the absolute value in each call, or one
-    /// if that is zero.
+    /// Sets the magnitudes of `x₀`, `u` and `p` that scale errors of sensitivities, `p̄` of CVODES.
+    /// The default, also used for zeros, is the absolute value in each call, or one if that is
+    /// zero.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] if one is negative or not finite: then the last ones stay.
+    /// [`Error::InvalidOption`] if a magnitude is negative or not finite; the previous ones remain
+    /// set.
     pub fn set_sensitivity_scales(
         &mut self,
         x0: &VectorX<M, T>,

@@ -1,4 +1,4 @@
-//! A family of implicit methods as one engine.
+//! The [`Engine`] of a family of implicit methods.
 
 use crate::adaptive::engine::{Engine, MethodState};
 use crate::adaptive::order::{MethodFamily, Orders, interpolate_step};
@@ -9,7 +9,7 @@ use crate::model::{Dae, VectorX};
 use crate::result::Dense;
 use crate::scalar::Real;
 
-/// What a family remembers: the steps that it takes, and those that it takes again.
+/// The memory of a family: its steps, and their derivatives.
 pub struct ImplicitState<M: Dae, B: MethodFamily, T: Real> {
     orders: Orders<M, T>,
     differentiator: B::Differentiator<M, T>,
@@ -51,7 +51,7 @@ impl<M: Dae, B: MethodFamily, T: Real> Engine<M, T> for B {
         interpolate_step(stages, x, y, t - entry.t, entry.h, dense)
     }
 
-    fn replays(state: &mut Self::State) -> &mut Self::Differentiator {
+    fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator {
         &mut state.differentiator
     }
 }

@@ -1,18 +1,18 @@
-//! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of
-//! four.
+//! The loops of a collocation step, compiled for each instruction set. Stages are stored in groups
+//! of four.
 
 use crate::linalg::{Arithmetic, COMPLEX_PARTS, Complex, Kernel, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Real, SideBySide};
 use core::marker::PhantomData;
 
-/// How many stages lie side by side.
+/// The number of stages in a group.
 pub const STAGES_PER_GROUP: usize = 4;
 
-/// The stages of an unknown.
+/// The values of an unknown at all stages.
 pub type StageGroups<T, const G: usize> = [[T; STAGES_PER_GROUP]; G];
 
-/// The residual at four stages in one call.
+/// Evaluates the residual at four stages.
 pub struct EvaluateResiduals<'a, M: Dae, T: Real> {
     pub points: &'a ArrayV<M, [T; STAGES_PER_GROUP]>,
     pub f: &'a mut ArrayK<M, [T; STAGES_PER_GROUP]>,
@@ -25,7 +25,7 @@ impl<M: Dae, T: Real> SideBySide<T, STAGES_PER_GROUP> for EvaluateResiduals<'_, 
     }
 }
 
-/// `V⁻¹ f` in the slots of the equations.
+/// Computes `V⁻¹ f` in the slots of the equations.
 pub struct TransformResiduals<'a, M: Dae, T, const S: usize, const G: usize> {
     pub left_eigenvectors: &'a [Complex<T, COMPLEX_PARTS>; S],
     pub f: [&'a [[T; STAGES_PER_GROUP]]; G],
@@ -59,11 +59,11 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for TransformResidu
     }
 }
 
-/// See [`Collocation::advance`].
+/// See [`Collocation::apply_increment`].
 pub struct ApplyIncrement<'a, 'b, T, const S: usize, const G: usize> {
-    /// Columns of `−h A`.
+    /// The columns of `−h A`.
     pub minus_ha: &'a [StageGroups<T, G>; S],
-    /// Columns of the basis for real parts, and for imaginary ones.
+    /// The right eigenvectors: real parts and imaginary parts.
     pub right_eigenvectors: [&'a [StageGroups<T, G>]; 2],
     /// The states at the start of the step.
     pub x: &'a [T],
@@ -82,7 +82,7 @@ impl<T: Real, const S: usize, const G: usize> Kernel for ApplyIncrement<'_, '_, 
         let nx = x.len();
         let mut sums = [[T::ZERO; STAGES_PER_GROUP]; G];
         for (index, (unknown, &scale)) in y.iter_mut().zip(scale).enumerate() {
-            // In registers until it is finished.
+            // A local copy stays in registers.
             let before = *unknown;
             let mut y = before;
             if let Some([[row]]) = rows.get(index) {
@@ -132,9 +132,9 @@ impl<T: Real, const S: usize, const G: usize> Kernel for ApplyIncrement<'_, '_, 
     }
 }
 
-/// The polynomial of the last step at the stages of this one.
+/// Extrapolates the polynomial of the last step to the stages of this one.
 pub struct ExtrapolateStages<'a, T, const S: usize, const G: usize> {
-    /// Columns of its weights.
+    /// The columns of the extrapolation weights.
     pub weights: [StageGroups<T, G>; S],
     pub from: &'a [[T; S]],
     pub to: &'a mut [StageGroups<T, G>],

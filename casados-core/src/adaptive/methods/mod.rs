@@ -1,4 +1,4 @@
-//! The methods: families of collocation methods, and explicit pairs.
+//! The adaptive methods: families of collocation methods, and explicit pairs.
 
 mod collocation;
 pub(super) mod explicit;
@@ -14,8 +14,8 @@ use crate::scalar::Real;
 use crate::tableau::{Gauss, Method, RadauIIA};
 use alloc::boxed::Box;
 
-/// Radau IIA methods of 3, 5 and 7 stages: more of them where Newton's method converges fast, fewer
-/// where it is slow.
+/// Radau IIA methods of 3, 5 and 7 stages: order selection increases the number of stages if
+/// Newton's method converges fast and reduces it if it converges slowly.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -60,8 +60,7 @@ macro_rules! single {
             const ENDS_ON_STAGE: bool = $ends_on_stage;
             type Differentiator<M: Dae, T: Real> = OneMethod<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn StageSolver<M, T> + Send + Sync>, Error> {
-                // As many lanes as there are eigenvalues, filled up to registers; stages in groups
-                // of four.
+                // The lanes of all eigenvalues, padded to registers; stages in groups of four.
                 let tableau = <Self as Method<$stages>>::TABLEAU;
                 Ok(Box::new(collocation::Collocation::<M, T, $stages, $groups>::new(tableau)?))
             }

@@ -1,11 +1,11 @@
-//! Derivatives of intervals that follow each other, in the directions of all of their controls.
+//! Derivatives over successive intervals with respect to all of their controls.
 
 use crate::linalg::axpy;
 use crate::model::Dae;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-/// Where the directions `W = (x₀, u₀, …, u_{N−1}, p)` are.
+/// The indices of the directions `W = (x₀, u₀, …, u_{N−1}, p)`.
 pub struct DirectionLayout<M> {
     pub intervals: usize,
     pub model: core::marker::PhantomData<M>,
@@ -24,7 +24,7 @@ impl<M: Dae> DirectionLayout<M> {
         self.parameter_column() + M::Shape::NP
     }
 
-    /// `next = A V + (B at u_k, C at p)`, row after row.
+    /// Computes `next = A V + (B at u_k, C at p)`, row by row.
     pub fn apply_chain_rule<T: Real>(
         &self,
         k: usize,
@@ -49,7 +49,7 @@ impl<M: Dae> DirectionLayout<M> {
         }
     }
 
-    /// `sum += g D`
+    /// Adds `sum += g D`.
     pub fn add_gradient<T: Real>(&self, k: usize, gradient: &[T], v: &[T], sum: &mut [T]) {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let (states, others) = gradient.split_at(nx);
@@ -61,7 +61,7 @@ impl<M: Dae> DirectionLayout<M> {
         axpy(T::ONE, parameters, &mut sum[self.parameter_column()..]);
     }
 
-    /// `sum += Dᵀ H D`, the product `H D` first.
+    /// Adds `sum += Dᵀ H D`, the product `H D` first.
     pub fn add_projected_hessian<T: Real>(
         &self,
         k: usize,
@@ -71,7 +71,7 @@ impl<M: Dae> DirectionLayout<M> {
         sum: &mut [T],
     ) {
         let (nx, nu, width) = (M::Shape::NX, M::Shape::NU, self.column_count());
-        // Where a local direction other than a state is.
+        // The global index of a local direction that is not a state.
         let global = |w: usize| {
             if w < nx + nu { self.control_column(k) + w - nx } else { self.parameter_column() + w - nx - nu }
         };

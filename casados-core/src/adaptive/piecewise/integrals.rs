@@ -1,7 +1,7 @@
-//! Derivatives of integrals over intervals with controls of their own.
+//! Derivatives of integrals over intervals with their own controls.
 //!
-//! An integrand sees one interval at a time, with derivatives by `(x_k, u_k, p)`; here they become
-//! those by all of `W = (x₀, u₀, …, u_{N−1}, p)`:
+//! An integrand has derivatives with respect to `(x_k, u_k, p)` of one interval; this module
+//! converts them to derivatives with respect to `W = (x₀, u₀, …, u_{N−1}, p)`:
 //!
 //! ```text
 //! dq/dW = Σ_k dq_k/d(x_k, u_k, p) D_k        H = Σ_k D_kᵀ H_k D_k        D_k = d(x_k, u_k, p)/dW
@@ -53,7 +53,7 @@ pub struct PiecewiseQuadrature<F: Function, T: Plain = f64> {
     pub dq_dp: MatrixYP<F, T>,
 }
 
-/// The derivatives of [`LeastSquares`] over several intervals, with the matrix of Gauss and Newton.
+/// The derivatives of [`LeastSquares`] over several intervals, with the Gauss-Newton matrix.
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -80,25 +80,25 @@ pub struct PiecewiseLeastSquares<M: Dae, T: Real = f64> {
     pub grad_u: Vec<VectorU<M, T>>,
     /// `∇φ` with respect to `p`
     pub grad_p: VectorP<M, T>,
-    /// `H`, the block of `x₀` and `x₀`.
+    /// The block `(x₀, x₀)` of the Gauss-Newton matrix `H`.
     pub h_xx: MatrixXX<M, T>,
-    /// `H`, the blocks of `x₀` and `u_k`.
+    /// The blocks `(x₀, u_k)` of `H`.
     pub h_xu: Vec<MatrixXU<M, T>>,
-    /// `H`, the blocks of `u_j` and `u_k`, row after row.
+    /// The blocks `(u_j, u_k)` of `H`, row by row.
     pub h_uu: Vec<MatrixUU<M, T>>,
-    /// `H`, the block of `x₀` and `p`.
+    /// The block `(x₀, p)` of `H`.
     pub h_xp: MatrixXP<M, T>,
-    /// `H`, the blocks of `u_k` and `p`.
+    /// The blocks `(u_k, p)` of `H`.
     pub h_up: Vec<MatrixUP<M, T>>,
-    /// `H`, the block of `p` and `p`.
+    /// The block `(p, p)` of `H`.
     pub h_pp: MatrixPP<M, T>,
 }
 
 listed!([F: Function, T: Plain] PiecewiseQuadrature<F, T> { dq_dx0, dq_du, dq_dp });
 listed!([M: Dae, T: Real] PiecewiseLeastSquares<M, T> { grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
 
-/// An integrand whose derivatives over several intervals have a form of their own: [`Quadrature`]
-/// and [`LeastSquares`].
+/// An integrand with its own type of derivatives over several intervals: [`Quadrature`] and
+/// [`LeastSquares`].
 ///
 /// ```
 /// # use casados::adaptive::{PiecewiseQuadrature, Spanning};
@@ -120,9 +120,9 @@ listed!([M: Dae, T: Real] PiecewiseLeastSquares<M, T> { grad_x0, grad_u, grad_p,
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub trait Spanning<M: Dae, T: Real>: Integrand<M, T> {
-    /// That form.
+    /// The type of the derivatives.
     type Derivatives;
-    /// Derivatives from rows and a matrix over all directions.
+    /// The derivatives from rows and a matrix with respect to all directions.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -169,7 +169,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for LeastSqu
     }
 }
 
-/// A symmetric matrix over all directions.
+/// A symmetric matrix with respect to all directions, in blocks.
 pub(super) struct HessianBlocks<M: Dae, T: Real> {
     pub h_xx: MatrixXX<M, T>,
     pub h_xu: Vec<MatrixXU<M, T>>,
@@ -180,7 +180,7 @@ pub(super) struct HessianBlocks<M: Dae, T: Real> {
 }
 
 impl<M: Dae> DirectionLayout<M> {
-    /// The blocks of a matrix, of whose elements that differ by rounding the lower ones count.
+    /// The blocks of a matrix; the lower triangle is used, since both differ by rounding.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -211,14 +211,14 @@ impl<M: Dae> DirectionLayout<M> {
     }
 }
 
-/// What an integrand adds up over all directions.
+/// The sums of an integrand with respect to all directions.
 pub struct QuadratureSums<M: Dae, T: Real> {
     pub(super) layout: DirectionLayout<M>,
-    /// A row for each output.
+    /// One gradient for each output.
     gradients: Vec<T>,
-    /// Of Gauss and Newton.
+    /// The Gauss-Newton matrix.
     gauss_newton_matrix: Vec<T>,
-    /// The second derivatives, as far as they are of the integrand itself.
+    /// The second derivatives of the integrand itself.
     pub(super) second_derivatives: Vec<T>,
     product: Vec<T>,
 }
@@ -242,8 +242,8 @@ impl<M: Dae, T: Real> QuadratureSums<M, T> {
         Ok(Self { layout: at, gradients, gauss_newton_matrix: matrix, second_derivatives: second, product })
     }
 
-    /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets
-    /// it.
+    /// Adds interval `k`, whose start has the derivatives `v`, and clears the sums of the
+    /// integrand.
     pub(super) fn add_interval(&mut self, k: usize, integrand: &mut dyn Integrand<M, T>, v: &[T]) {
         let Self { layout: at, gradients, gauss_newton_matrix: matrix, second_derivatives: second, product } =
             self;
@@ -259,7 +259,7 @@ impl<M: Dae, T: Real> QuadratureSums<M, T> {
                 }
             }
         };
-        // The exact second derivatives have the matrix of Gauss and Newton too.
+        // The exact second derivatives include the Gauss-Newton matrix.
         if let Some(lower) = integrand.gauss_newton_sum() {
             project(lower, [matrix, second]);
         }

@@ -1,5 +1,5 @@
-//! Integration over controls that are piecewise constant: an adaptive integration for each
-//! interval, one after the other, and the derivatives of all of them together.
+//! Adaptive integration with piecewise constant controls, one interval after the other, and the
+//! derivatives over all intervals.
 //!
 //! With `x_{k+1} = Φ_k(x_k, u_k, p)` and `W = (x₀, u₀, …, u_{N−1}, p)`:
 //!
@@ -39,7 +39,7 @@ use integrals::{HessianBlocks, QuadratureSums};
 
 pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 
-/// An adaptive integrator over intervals, each with a control of its own.
+/// An adaptive integrator over successive intervals, each with its own control.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -53,37 +53,38 @@ pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 /// # Ok::<(), casados::Error>(())
 /// ```
 ///
-/// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the
-/// others at the end of the one before. Steps end where intervals end. `ends` are times as the
-/// model sees them, not lengths, and so is that of [`dense`](Self::dense).
+/// The first interval starts at the time of [`Integrator::set_time`], each other one at the end of
+/// the preceding one. Steps end at the ends of intervals. `ends` and the argument of
+/// [`dense`](Self::dense) are times of the model, not lengths.
 ///
-/// Later calls of a kind do not allocate, but for the lists that results of derivatives own and the
-/// sums of an integrand.
+/// Repeated calls of one kind allocate only the lists that results of derivatives own and the sums
+/// of an integrand.
 ///
 /// # Errors
-/// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for
-/// each interval; [`Error::Unordered`] if the ends are not in order, [`Error::OutsideInterval`] if
-/// they are not those of the steps that are kept.
+/// Every call: the errors of [`Integrator`]; [`Error::Intervals`] if the number of controls is not
+/// that of the intervals; [`Error::Unordered`] if the ends are not in order;
+/// [`Error::OutsideInterval`] if they differ from those of frozen steps.
 pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     segments: Vec<Segment<M, T>>,
-    /// How many of them there are, and whether the last call succeeded with them.
+    /// The number of intervals, and whether the last call succeeded.
     interval_count: usize,
     solved: bool,
-    /// Steps that are kept are taken by this. Programs that keep none have no integrator for that.
+    /// Repeats the frozen steps. A function pointer: programs that freeze no steps do not contain
+    /// it.
     frozen: Option<FrozenReplay<M, B, T>>,
     statistics: AdaptiveStatistics,
     nominal: Nominal<M, T>,
     /// `V_k` and `V_{k+1}`.
     sensitivities: [Vec<T>; 2],
-    /// Second derivatives of all columns, and a product on the way there.
+    /// The Hessian with respect to all directions, and an intermediate product.
     second_derivatives: [Vec<T>; 2],
 }
 
 type FrozenReplay<M, B, T> = fn(&mut Piecewise<M, B, T>, &VectorX<M, T>) -> Result<(), Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
-    /// Of an integrator, which keeps its options, tolerances, parameters and start time.
+    /// Takes an integrator, which keeps its options, tolerances, parameters and start time.
     #[must_use]
     pub fn new(integrator: Integrator<M, B, T>) -> Self {
         let nominal = Nominal::zeroed();
@@ -106,13 +107,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         &mut self.integrator
     }
 
-    /// What the last call did to choose its steps, in all intervals.
+    /// Statistics of the step selection of the last call, over all intervals.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
     }
 
-    /// `x` and `z` at the end, and the consistent `z` at the start.
+    /// Integrates; returns `x` and `z` at the end, and the consistent `z` at the start.
     ///
     /// # Errors
     /// See [`Piecewise`].
@@ -130,7 +131,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(&self.nominal)
     }
 
-    /// As [`Piecewise::solve`], with an integrand: the steps are taken again, to rounding.
+    /// As [`Piecewise::solve`], with an integrand: the steps are replayed, solved to rounding.
     pub(super) fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
@@ -144,8 +145,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(&self.nominal)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the intervals of the last call;
-    /// where two of them meet, that of the first.
+    /// The solution at the model's time `t` within the intervals of the last call; where two
+    /// intervals meet, that of the first one.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`],
@@ -158,7 +159,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         dense_at(integrator, segments.get_mut(..*count).unwrap_or_default(), nominal, t)
     }
 
-    /// The solution at the end, and its derivatives with respect to `x₀`, all controls and `p`.
+    /// Integrates; returns the solution at the end and its derivatives with respect to `x₀`, all
+    /// controls and `p`.
     ///
     /// # Errors
     /// See [`Piecewise`].
@@ -208,8 +210,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok((self.adjoint_sweep(forward, lambda, &mut sums.second_derivatives, Some(integrand))?, derivatives))
     }
 
-    /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and
-    /// `p`.
+    /// Integrates; returns the solution at the end and the gradient of `λᵀx` with respect to `x₀`,
+    /// all controls and `p`.
     ///
     /// # Errors
     /// See [`Piecewise`].
@@ -250,13 +252,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
             axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
-        // Those by `x₀` and each control are of one interval, which has looked at them.
+        // The gradients with respect to `x₀` and each control belong to one interval, which has
+        // checked them.
         check_output(result.grad_p.as_slice(), 0)?;
         self.solved = true;
         Ok(result)
     }
 
-    /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    /// Integrates; returns the solution at the end, its derivatives, and the gradient and Hessian
+    /// of `λᵀx`.
     ///
     /// # Errors
     /// See [`Piecewise`].
@@ -279,8 +283,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         result
     }
 
-    /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to
-    /// `sum`.
+    /// Computes the gradient and the Hessian after [`Piecewise::forward_sweep`], with the
+    /// contributions of an integrand to `sum`.
     fn adjoint_sweep(
         &mut self,
         forward: PiecewiseForward<M, T>,
@@ -326,7 +330,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(result)
     }
 
-    /// Following calls take the steps of the last successful one, whatever they are given, and
+    /// Freezes the steps of the last successful call: later calls repeat them for all inputs and
     /// solve them to rounding.
     ///
     /// # Errors
@@ -342,13 +346,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(())
     }
 
-    /// Following calls choose their steps again.
+    /// Ends the effect of [`freeze`](Self::freeze): later calls choose their steps.
     pub fn thaw(&mut self) {
         self.frozen = None;
     }
 }
 
-/// The result at the end of interval `k`.
+/// Copies the result at the end of interval `k`.
 fn collect_end<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T>, k: usize) {
     if k == 0 {
         nominal.z0 = interval.z0;

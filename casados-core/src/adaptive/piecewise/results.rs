@@ -1,4 +1,4 @@
-//! What is returned over several intervals.
+//! Results over several intervals.
 
 use crate::model::{
     Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX, VectorP,
@@ -102,7 +102,7 @@ pub struct PiecewiseHessian<M: Dae, T: Real = f64> {
     pub h_xx: MatrixXX<M, T>,
     /// `∂²(λᵀx)/∂x₀∂u_k`
     pub h_xu: Vec<MatrixXU<M, T>>,
-    /// `∂²(λᵀx)/∂u_j∂u_k`, row after row.
+    /// `∂²(λᵀx)/∂u_j∂u_k`, row by row.
     pub h_uu: Vec<MatrixUU<M, T>>,
     /// `∂²(λᵀx)/∂x₀∂p`
     pub h_xp: MatrixXP<M, T>,

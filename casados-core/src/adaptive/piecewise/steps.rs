@@ -1,10 +1,10 @@
-//! The steps of the intervals one after the other, chosen or taken again.
+//! The steps of successive intervals, chosen or replayed.
 
 use super::*;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
-    /// Takes all steps, or prepares those that are kept for other controls. There is a result as
-    /// soon as the caller says so.
+    /// Takes all steps, or prepares the frozen ones for other controls. The caller marks the result
+    /// as valid.
     pub(super) fn prepare_steps(
         &mut self,
         x0: &VectorX<M, T>,
@@ -60,7 +60,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             (segment.x, segment.u, segment.span, segment.start_guess) =
                 (x, *u, span, integrator.workspace.start_guess);
             segment.steps_were_chosen = true;
-            // Each interval has a tape of its own, which in later calls is long enough.
+            // Each interval has a tape of its own, which later calls reuse.
             core::mem::swap(&mut integrator.tape, &mut segment.tape);
             let result = integrator.run_to(&x, u, *end, true, |_, _| Ok(()));
             core::mem::swap(&mut integrator.tape, &mut segment.tape);
@@ -70,7 +70,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             if k == 0 {
                 *nominal = integrator.workspace.result;
             }
-            // Where there are several solutions, the next interval goes on with this one.
+            // The next interval continues this solution, if there are several.
             let point = integrator.workspace.point.as_ref();
             let ends = point[..nx].iter().chain(&point[2 * nx..]);
             for (given, end) in integrator.workspace.start_guess.as_mut().iter_mut().zip(ends) {
@@ -98,7 +98,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(())
     }
 
-    /// All steps again, to rounding.
+    /// Replays all steps, solved to rounding.
     pub(super) fn replay_steps(
         &mut self,
         x0: &VectorX<M, T>,
@@ -118,8 +118,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         finish_integrand(&mut integrand)
     }
 
-    /// The same with derivatives, and what those of second order need; with an integrand and what
-    /// it adds up, or without.
+    /// Replays all steps with derivatives and the data of second-order ones; with an integrand and
+    /// its sums, or without.
     pub(super) fn forward_sweep(
         &mut self,
         x0: &VectorX<M, T>,

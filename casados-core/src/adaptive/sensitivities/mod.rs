@@ -1,13 +1,12 @@
-//! Derivatives of a run: the accepted steps are kept as they are, and each is differentiated
-//! exactly.
+//! Sensitivities of a run: the exact derivatives of the accepted steps.
 //!
 //! ```text
 //! x_{n+1} = Φ_n(x_n, u, p)        V_{n+1} = ∂Φ_n/∂x V_n + ∂Φ_n/∂(u, p)        λ_n = (∂Φ_n/∂x)ᵀ λ_{n+1}
 //! d²(λᵀ x_N)/dw² = Σ_n D_nᵀ ∇²(λ_{n+1}ᵀ Φ_n) D_n        D_n = d(x_n, u, p)/dw
 //! ```
 //!
-//! An integrand takes part step by step: forwards with the derivatives of its stages by
-//! `(x₀, u, p)`, backwards in `λ_n`.
+//! An integrand takes part in each step: forward with the derivatives of its stages with respect to
+//! `(x₀, u, p)`, backward through `λ_n`.
 
 mod step_errors;
 
@@ -16,7 +15,7 @@ use step_errors::with_step_number;
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::engine::Engine;
 use crate::adaptive::point::ModelPoint;
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::step::{Span, Workspace};
 use crate::adaptive::tape::Tape;
 use crate::error::Error;
@@ -43,39 +42,39 @@ use bytemuck::Zeroable;
 pub struct SensitivityMemory<M: Dae, T: Plain> {
     pub hessian: Hessian<M, T>,
     pub adjoint: Adjoint<M, T>,
-    /// `V_n`, and `V_{n+1}`.
+    /// `V_n` and `V_{n+1}`.
     step_sensitivities: [StateSensitivities<M, T>; 2],
     lambda: VectorX<M, T>,
-    /// The gradient of all steps.
+    /// The sum of the gradients of all steps.
     gradient_sum: ArrayW<M, T>,
-    /// The Hessian of one step times `D`, and the sum of all.
+    /// The Hessian of one step times `D`, and the sum over all steps.
     hessian_product: FullHessian<M, T>,
     hessian_sum: FullHessian<M, T>,
 }
 
-/// What derivatives are taken of.
+/// The recorded steps to be differentiated.
 pub struct RecordedSteps<'a, M: Dae, T: Real> {
     pub workspace: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     pub span: Span<T>,
-    /// Start values of `(ẋ, z)`.
+    /// Initial guess of `(ẋ, z)`.
     pub start_guess: ArrayK<M, T>,
-    /// Whether the steps were chosen for these inputs: then each is taken from where the run took
-    /// it. Steps that are solved to rounding one after the other lead elsewhere than those that
-    /// were solved to a coarse tolerance, where errors grow by much, and do not fit there.
+    /// Whether the steps were chosen for these inputs: each is then replayed from the accepted
+    /// state. A sequence of steps solved to rounding deviates from steps solved to a coarse
+    /// tolerance if errors are amplified, and the accepted stages would not fit.
     pub steps_were_chosen: bool,
 }
 
 impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
-    /// Takes all steps again, to rounding; `each` is called to take one, and returns what it gave.
+    /// Replays all steps, solved to rounding; `each` replays one step and returns its solution.
     fn replay_steps<B: Engine<M, T>>(
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
             &mut B::Differentiator,
-            &AcceptedStep<'_, M, T>,
+            &StepRecord<'_, M, T>,
             usize,
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
@@ -91,7 +90,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         self.tape.begin_replay();
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
-            let replays = B::replays(state);
+            let replays = B::differentiator(state);
             let (start, y) = self.tape.step_numbers(step, M::Shape::NX);
             if self.steps_were_chosen {
                 for (x, start) in x.as_mut_slice().iter_mut().zip(start) {
@@ -99,7 +98,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 }
             }
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -119,7 +118,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         Ok(())
     }
 
-    /// Consistent `(ẋ, z)` at the end, from the last stage and the `z` that is there.
+    /// Consistent `(ẋ, z)` at the end, from the last stage and the present `z`.
     fn consistent_end(&mut self) -> Result<ArrayK<M, T>, Error> {
         let (nx, Workspace { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.workspace);
         let mut guess = ArrayK::<M, T>::zeroed();
@@ -135,7 +134,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         Ok(guess)
     }
 
-    /// The solution alone.
+    /// Computes the solution.
     ///
     /// # Errors
     /// Those of Newton's method.
@@ -154,7 +153,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         finish_integrand(&mut integrand)
     }
 
-    /// The solution and its derivatives; `history` takes `V_n` of each step, if it is wanted.
+    /// Computes the solution and its derivatives; `history` receives `V_n` of each step, if given.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
@@ -206,7 +205,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         check_forward(result, count)
     }
 
-    /// The gradient of `λᵀx`, after the solution: backwards over the steps.
+    /// Computes the gradient of `λᵀx` after the solution, by a backward sweep over the steps.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
@@ -227,7 +226,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -235,7 +234,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 stages_are_solved: true,
             };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let local = B::replays(state).adjoint(&taken, now, dyn_integrand(&mut backwards));
+            let local = B::differentiator(state).adjoint(&taken, now, dyn_integrand(&mut backwards));
             let local = local.map_err(|error| with_step_number(error, step))?;
             now.as_mut_slice().copy_from_slice(local.grad_x0.as_slice());
             let parts = local.grad_u.as_slice().iter().chain(local.grad_p.as_slice());
@@ -252,7 +251,8 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         check_output(others, 0)
     }
 
-    /// The gradient and the Hessian of `λᵀx`, after [`Frozen::forward`] with its history.
+    /// Computes the gradient and the Hessian of `λᵀx`, after [`RecordedSteps::forward`] with its
+    /// history.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; a second derivative that is not finite;
@@ -285,7 +285,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: at,
                 h: entry.h,
                 stage_unknowns: y,
@@ -293,7 +293,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
                 stages_are_solved: true,
             };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let second = B::replays(state).hessian(&taken, now, dyn_integrand(&mut backwards));
+            let second = B::differentiator(state).hessian(&taken, now, dyn_integrand(&mut backwards));
             let second = second.map_err(|error| with_step_number(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());
@@ -322,7 +322,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
     }
 }
 
-/// The integrand of one step of an interval, or of one of several intervals.
+/// The integrand of a step in an interval, or in one of several intervals.
 pub(super) fn chain_rule_integrand<'a, M: Dae, T: Real>(
     integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a StateSensitivities<M, T>>,

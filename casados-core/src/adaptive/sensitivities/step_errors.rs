@@ -1,8 +1,8 @@
-//! Where errors are.
+//! The places of errors.
 
 use super::*;
 
-/// An error of a step is one of the run.
+/// Replaces the step number of an error of a single step by that of the run.
 pub(super) fn with_step_number(mut error: Error, number: usize) -> Error {
     match &mut error {
         Error::NonFiniteModel { at, .. }

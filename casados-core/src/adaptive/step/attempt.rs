@@ -1,24 +1,25 @@
-//! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
+//! The parts of a step: order selection, matrix, attempt, and acceptance.
 
 use super::*;
 use crate::adaptive::discontinuity::{BranchChange, Branches};
 use crate::adaptive::newton_monitor::NewtonMonitor;
 
-/// The estimate of a step in which the highest derivative of a spline jumps is about so many times
-/// its error.
+/// Approximate ratio of the estimate and the error of a step across a spline knot, where the
+/// highest derivative jumps.
 const SPLINE_KNOT_ERROR_FACTOR: f64 = 3.0;
-/// Where the model changes its branch the error is held below the tolerance that was asked for by
-/// this: there may be many such steps, and what follows makes more of them.
+/// Factor of the error of a step across a switching surface, relative to the user's tolerance: a
+/// run may have many such steps, and later steps amplify their errors.
 const SWITCH_ERROR_FACTOR: f64 = 6.0;
-/// Rounding errors are like jumps: these are looked for where the least error that counts is so
-/// many times as large, of `f64` with relative tolerances of 3e-11 and more.
+/// Minimum ratio of the least relevant error and the noise for the detection of discontinuities,
+/// which resemble rounding errors: relative tolerances of at least 3e-11 in `f64`.
 const MIN_ERROR_TO_NOISE: f64 = 1e4;
-/// What follows a rough step may be shorter by this and still be a step.
+/// A discontinuity rejects a step only if a step shorter by this factor is above the resolution of
+/// the time.
 const MIN_DISCONTINUITY_REDUCTION: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
-    /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
-    /// of the iteration.
+    /// Selects the order if a new matrix is needed anyway, and sets the initial guess of the
+    /// stages.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -40,7 +41,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
         let stages = levels.get::<B>(state.order.order_index)?;
         match ratio {
-            // The polynomial of the last step may be that of another branch.
+            // The polynomial of the last step may belong to another branch.
             Some(ratio) if M::BRANCHES == 0 || !state.is_unsolved() => {
                 stages.extrapolate_last_step(ratio);
             }
@@ -49,11 +50,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// The factors of the matrix of a step as far as they are needed; whether the step can be
-    /// tried.
+    /// Updates the factors of the Newton matrix as far as needed; returns whether the step can be
+    /// attempted.
     ///
     /// # Errors
-    /// A Jacobian that is not finite; matrices that stay singular.
+    /// A Jacobian that is not finite; matrices that remain singular.
     pub(super) fn prepare_factors<B: MethodFamily>(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
@@ -95,7 +96,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
     }
 
-    /// Factors by the plan, or with pivots.
+    /// Factorises the matrix, by the plan or with pivoting.
     fn factor_matrix(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
@@ -106,10 +107,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         stages.factor(&self.workspace.jacobian, state.h)
     }
 
-    /// Whether an attempt failed because the planned elimination lost its digits: its pivots are
-    /// judged before the program runs, and may vanish where it leads. Then the matrix is pivoted,
-    /// and the same step is tried again; the factors of later steps are tested before they are
-    /// used.
+    /// Whether an attempt failed because the planned pivots, chosen at compile time, are too small.
+    /// The matrix is then factorised with pivoting and the same step repeated; later planned
+    /// factors are tested before use.
     pub(super) fn retry_with_pivoting(
         &mut self,
         stages: &dyn StageSolver<M, T>,
@@ -132,13 +132,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.statistics.failed += 1;
         (state.uses_pivoting, state.verifies_pivots) = (true, true);
         state.matrix_update = MatrixUpdate::Factors;
-        // The rate of this iteration says nothing of the next one.
+        // The contraction rate of this iteration does not apply to the next one.
         (state.newton.contraction_rate, state.newton.eta) = (THET, NewtonMonitor::UNKNOWN_ETA);
         true
     }
 
-    /// The Jacobian in the middle of the step, as far as that is foreseen: nearer to all stages
-    /// than the start is. Where the step fails, at the start.
+    /// Evaluates the Jacobian at the predicted middle of the step, close to all stages; in the
+    /// first step, after a rejection and if it is not finite, at the start.
     ///
     /// # Errors
     /// A value that is not finite.
@@ -163,11 +163,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// Solves the stages: the estimated error relative to what is tolerated, of derivatives too if
-    /// they take part.
+    /// Solves the stages; returns the estimated error relative to the tolerance, including
+    /// controlled sensitivities.
     ///
     /// # Errors
-    /// [`Failure`]
+    /// [`NewtonFailure`]
     pub(super) fn attempt_step(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
@@ -200,11 +200,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(error)
     }
 
-    /// Refuses a step in which the model changes its branch where its error would be above the
-    /// tolerance that was asked for.
+    /// Rejects a step in which the model changes its branch, if its error exceeds the user's
+    /// tolerance.
     ///
     /// # Errors
-    /// [`Failure::Discontinuity`], and a value that is not finite.
+    /// [`NewtonFailure::Discontinuity`], and a value that is not finite.
     fn reject_across_branches(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
@@ -222,21 +222,23 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             BranchChange::Switch => SWITCH_ERROR_FACTOR * *tolerance_ratio,
             BranchChange::SplineKnot => over_knot,
         };
-        let rough = factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
-        // A derivative that jumps leaves an error like the fourth power of the step size, or a
-        // lower one. Where times are no finer than that, the step is as good as can be.
-        let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
+        let discontinuity_error =
+            factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
+        // If a derivative jumps, the error is proportional to the fourth or a lower power of the
+        // step size. A step at the resolution of the time is accepted.
+        let factor = (0.9 * Scalar::powf(discontinuity_error, -0.25)).clamp(0.1, 0.9);
         let shorter = state.h * T::from_f64(MIN_DISCONTINUITY_REDUCTION * factor);
-        if rough >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
+        if discontinuity_error >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
             return Err(NewtonFailure::Discontinuity(factor));
         }
         Ok(())
     }
 
-    /// Goes to the end of a step; whether the run is over. `factor` is that of the next step size.
+    /// Moves to the end of an accepted step; returns whether the run is finished. `factor` is that
+    /// of the next step size.
     ///
     /// # Errors
-    /// What `after` has; no consistent `(ẋ, z)` at the end.
+    /// Those of `after`; no consistent `(ẋ, z)` at the end.
     pub(super) fn accept_step(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
@@ -274,7 +276,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             self.make_consistent(end)?;
         }
         if state.is_starting {
-            // How fast a short step converged says nothing of one that is much longer.
+            // The contraction rate of a short step does not hold for a much longer one.
             state.newton.eta = NewtonMonitor::UNKNOWN_ETA;
         }
         if state.is_last {

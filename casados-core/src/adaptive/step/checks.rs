@@ -1,4 +1,4 @@
-//! What a step needs, and errors where it is not there: a finite Jacobian, a length.
+//! Checks of a step: a finite Jacobian, convergence, and a minimum step size.
 
 use super::crossing::shortest_step;
 use super::state::StepState;
@@ -6,12 +6,11 @@ use super::*;
 use crate::error::Unsettled;
 use crate::irk::{analyse_pivots, unknown_name};
 
-/// A step that is this much shorter than others of the run, and still not solved, stands for all
-/// shorter ones.
+/// Ratio to the longest accepted step below which a step that is not solved ends the run.
 const MIN_STEP_TO_LONGEST: f64 = 1e-6;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
-    /// At the point that was reached, or in the middle of the step.
+    /// Evaluates the Jacobian at the current point, or in the middle of the step.
     ///
     /// # Errors
     /// A value that is not finite.
@@ -30,10 +29,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// After an iteration that did not converge: whether a shorter step is worth an attempt.
+    /// After a failed iteration: tests whether a shorter step is worth an attempt.
     ///
     /// # Errors
-    /// [`Error::StepSizeUnderflow`], with what does not settle.
+    /// [`Error::StepSizeUnderflow`], with the equation and unknown that do not converge.
     pub(super) fn check_convergence(
         &self,
         stages: &dyn StageSolver<M, T>,
@@ -41,7 +40,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         span: Span<T>,
     ) -> Result<(), Error> {
         let size = state.h.abs();
-        // Steps over a switching surface are tried down to a part of the shortest length.
+        // Steps across a switching surface are attempted down to a part of the shortest step size.
         let least = if M::BRANCHES == 0 {
             shortest_step(span, state.t).max(T::from_f64(1e-12) * (span.end - span.start).abs())
         } else {
@@ -69,7 +68,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::StepSizeUnderflow`]
     pub(in crate::adaptive) fn check_step_size(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
         let size = h.to_f64().abs();
-        // Of the least numbers there is no tenth.
+        // The smallest subnormal numbers have no tenth.
         let tenth = T::from_f64(0.1) * h;
         let part = if tenth == T::ZERO { h } else { tenth };
         if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + part == t {
@@ -79,8 +78,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// Whether `∂f/∂z` becomes singular at the point that was reached, where that may be the
-    /// reason.
+    /// Whether `∂f/∂(ẋ, z)` becomes singular along an algebraic state at the current point, as a
+    /// possible cause of the failure.
     fn singular_algebraic(&self, reason: Refusal) -> Option<Refusal> {
         let possible = matches!(reason, Refusal::Error | Refusal::NotConverged | Refusal::Singular);
         if M::Shape::NZ == 0 || !possible {

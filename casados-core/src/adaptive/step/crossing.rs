@@ -1,26 +1,25 @@
-//! Where a model changes its branch at once: an algebraic state that jumps has a Jacobian on each
-//! side, and Newton's method, which has one for all stages, converges in no step over the border,
-//! however short it is.
+//! Crossing of switching surfaces: if an algebraic state jumps, the Jacobians of both sides differ,
+//! and Newton's method, with one Jacobian for all stages, converges in no step across the surface.
 
 use super::state::StepState;
 use super::*;
 use crate::adaptive::discontinuity::Branches;
 use crate::adaptive::point::variable_of_unknown;
 
-/// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
-/// there is far below rounding.
+/// Shortest step size, in roundoff errors of the interval or the time: the error of an explicit
+/// Euler step of this length is far below rounding.
 const SHORTEST_STEP_ROUNDOFFS: f64 = 1e3;
 
-/// The length of a step that is as short as any.
+/// The shortest step size.
 pub(super) fn shortest_step<T: Real>(span: Span<T>, t: T) -> T {
     T::from_f64(SHORTEST_STEP_ROUNDOFFS * T::EPSILON) * (span.end - span.start).abs().max(t.abs())
 }
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
-    /// Goes over a border that a step ends at whose iteration did not converge however short it
-    /// was: `x` by `h ẋ`, and from there on as from the start of an interval.
+    /// Crosses a switching surface ahead of a step that fails to converge at the shortest step
+    /// size: an explicit Euler step `x + h ẋ`, and a restart from consistent `(ẋ, z)`.
     ///
-    /// Where there is no solution behind it the step fails as before.
+    /// Without a solution beyond the surface the step fails as before.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -37,7 +36,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if state.h.abs() >= shortest || left <= T::from_f64(4.0) * shortest {
             return Ok(());
         }
-        // The step that failed last was at most twice as long.
+        // The last failed step was at most twice as long.
         let over = T::from_f64(4.0) * shortest;
         let end = state.t + if span.end < span.start { -over } else { over };
         let before = self.workspace.point;
@@ -55,7 +54,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// The point that an explicit Euler step leads to, with consistent `(ẋ, z)`.
+    /// Moves to the end of an explicit Euler step, with consistent `(ẋ, z)`.
     fn euler_step(&mut self, end: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
         let Workspace { point, start, u, parameters, .. } = &mut *self.workspace;

@@ -1,4 +1,4 @@
-//! The steps of an interval.
+//! The loop over the steps of an interval.
 
 mod attempt;
 mod checks;
@@ -25,36 +25,36 @@ use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 use state::{MatrixUpdate, StepState};
 
-/// After so many singular matrices in a row the problem is.
+/// Maximum number of successive singular matrices; more end the run.
 const MAX_SINGULAR_MATRICES: usize = 5;
 
 /// Memory of a run.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 pub struct Workspace<M: Dae, T: Plain> {
-    /// The variables at the time that was reached.
+    /// The variables at the current time.
     pub point: ArrayV<M, T>,
-    /// Those where the Jacobian is to be evaluated.
+    /// The variables in the middle of the step, for the Jacobian.
     midpoint: ArrayV<M, T>,
     pub jacobian: M::Jacobian<T>,
     pub f: ArrayK<M, T>,
     /// `(ẋ, z)` at the start.
     pub start: ArrayK<M, T>,
-    /// Start values for them, as they were given.
+    /// The user's initial guess of them.
     pub start_guess: ArrayK<M, T>,
     pub tolerances: Tolerances<M, T>,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
-    /// Magnitudes of `(x₀, u, p)` by which derivatives are measured; zero if they are not given.
+    /// Magnitudes of `(x₀, u, p)` for errors of sensitivities; zero if not set.
     pub magnitudes: ArrayW<M, T>,
     pub u: VectorU<M, T>,
-    /// Whether the constant entries of the Jacobian are there.
+    /// Whether the constant entries of the Jacobian are written.
     pub(super) jacobian_constants_written: bool,
 }
 
 impl<M: Dae, T: Real> Workspace<M, T> {
-    /// The step that is tried, from where the run is.
+    /// The step to be attempted from the current point.
     fn step_context(&self, state: &StepState<T>) -> StepContext<'_, M, T> {
         let Self { point, tolerances, .. } = self;
         StepContext {
@@ -68,7 +68,7 @@ impl<M: Dae, T: Real> Workspace<M, T> {
     }
 }
 
-/// An interval.
+/// The interval of a run.
 #[derive(Clone, Copy)]
 pub struct Span<T> {
     pub start: T,
@@ -77,7 +77,7 @@ pub struct Span<T> {
 
 impl<T: Real> Span<T> {
     /// # Errors
-    /// [`Error::OutsideInterval`] if another interval is asked for than this one.
+    /// [`Error::OutsideInterval`] if the interval differs from this one.
     pub fn check_same(&self, start: T, end: T) -> Result<(), Error> {
         let other = if start == self.start { end } else { start };
         if start == self.start && end == self.end {
@@ -88,38 +88,38 @@ impl<T: Real> Span<T> {
     }
 }
 
-/// What a run works with.
+/// The parts of a run.
 pub struct Run<'a, M: Dae, T: Real> {
     pub options: &'a AdaptiveOptions,
     pub workspace: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
-    /// Whether steps are to be remembered.
+    /// Whether accepted steps are recorded.
     pub record_steps: bool,
-    /// Derivatives, if they take part.
+    /// The controlled sensitivities.
     pub sensitivities: Option<&'a mut Variational<M, T>>,
     pub statistics: &'a mut AdaptiveStatistics,
 }
 
-/// What is called after each accepted step, with memory for dense output.
+/// A function that is called after each accepted step, with memory for dense output.
 pub type AfterStep<'a, M, T> =
     &'a mut dyn FnMut(&mut AcceptedStepOutput<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>;
 
 /// Dense output.
 type EvaluateDense<'a, M, T> = &'a mut dyn FnMut(T, &mut Dense<M, T>) -> Result<(), Error>;
 
-/// An accepted step.
+/// An accepted step, as passed to the function after it.
 pub struct AcceptedStepOutput<'a, M: Dae, T: Real> {
-    /// The solution at a time inside it.
+    /// Evaluates the solution at a time within the step.
     pub evaluate_dense: EvaluateDense<'a, M, T>,
     /// The time at its end.
     pub end: T,
-    /// Set if the interval is to end with it.
+    /// Set by the function to end the run with this step.
     pub stop: bool,
 }
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
-    /// The identity, if derivatives take part.
+    /// Sets the sensitivities to the identity, if they are controlled.
     ///
     /// # Errors
     /// As [`Consistent::forward`].
@@ -134,13 +134,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         )
     }
 
-    /// What is tolerated by a method with so many stages.
+    /// Sets the tolerances of a method with this number of stages.
     fn set_estimator_tolerances<B: MethodFamily>(&mut self, stages: usize) {
         self.workspace.tolerances.set_estimator_tolerances(stages, B::ENDS_ON_STAGE);
         self.update_scales();
     }
 
-    /// What is tolerated at the time that was reached.
+    /// Updates the scales at the current point.
     fn update_scales(&mut self) {
         let Workspace { tolerances, point, .. } = &mut *self.workspace;
         tolerances.update_scales(&point.as_ref()[M::Shape::NX..]);
@@ -149,7 +149,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Integrates the interval from `x0`; `after` is called after each accepted step.
     ///
     /// # Errors
-    /// No consistent start, and whatever ends a run early.
+    /// No consistent start; the errors that end a run.
     pub fn integrate<B: MethodFamily>(
         &mut self,
         levels: &mut Orders<M, T>,

@@ -1,4 +1,4 @@
-//! Where a run begins: consistent states, and the length of the first step.
+//! The start of a run: consistent initial values, and the size of the first step.
 
 use crate::adaptive::point::{ModelPoint, variable_of_unknown, write_inputs};
 use crate::adaptive::step::{Run, Span, Workspace};
@@ -10,12 +10,12 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// The exponent of implicit methods, whatever their order: with that of the estimate errors of five
-/// Gauss stages do not follow tolerances.
+/// Exponent of the first step size of all implicit methods: with `1/(s+1)` the errors of five Gauss
+/// stages do not follow the tolerance.
 const FIRST_STEP_EXPONENT: f64 = 0.25;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
-    /// Everything at the start of the interval.
+    /// Prepares a run at the start of the interval.
     pub(super) fn prepare_run(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
         let Workspace {
             start,
@@ -34,8 +34,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let at = ModelPoint { x: x0, u, p: parameters, t: span.start };
         match self.consistent.solve_with_diagnosis(&at, start) {
             Ok(points) => self.statistics.residuals += points,
-            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not
-            // full rank.
+            // A model without `z` may have a singular `f_ẋ` and still solvable equations.
             Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {
                 *start = Zeroable::zeroed()
             }
@@ -46,7 +45,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
+    /// Solves for consistent `ẋ` and `z` at the current time, from the present values.
     pub(super) fn make_consistent(&mut self, t: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
         let Workspace { point, u, parameters, .. } = &mut *self.workspace;
@@ -58,7 +57,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
         match self.consistent.solve(&ModelPoint { x: &x, u, p: parameters, t }, &mut y) {
             Ok(points) => self.statistics.residuals += points,
-            // As at the start.
+            // Singular `f_ẋ`, as at the start.
             Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => return Ok(()),
             Err(error) => return Err(error),
         }
@@ -68,7 +67,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
-    /// The variables at the start, from `(ẋ, z)` there.
+    /// Writes the variables at the start, with the consistent `(ẋ, z)`.
     pub fn write_start(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
         let nx = M::Shape::NX;
         let Workspace { point, u, parameters, result, .. } = &mut *self.workspace;
@@ -84,7 +83,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[nx..]);
     }
 
-    /// The solution at the end.
+    /// Writes the solution at the end.
     pub fn write_result(&mut self) {
         let nx = M::Shape::NX;
         let Workspace { point, result, .. } = &mut *self.workspace;
@@ -93,7 +92,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
     }
 
-    /// The length of the first step.
+    /// The size of the first step.
     pub(super) fn initial_step_size(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
         if let Some(step) = self.options.initial_step {
             return Ok(step.min(longest));
@@ -106,7 +105,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
         let length = first_step_size([size, slope], longest, FIRST_STEP_EXPONENT, |step| {
-            // A second point, if there is a consistent one.
+            // A second point, if consistent values exist there.
             let h = T::from_f64(if span.end < span.start { -step } else { step });
             let mut x = VectorX::<M, T>::zeroed();
             for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {

@@ -1,16 +1,16 @@
-//! Where a run is, and what its steps have told it.
+//! The state of a run, and the selection of the next step.
 
 use super::*;
 use crate::adaptive::newton_monitor::NewtonMonitor;
 use crate::adaptive::order::OrderSelection;
 use crate::adaptive::step_size::GustafssonController;
 
-/// A step is not made longer by less than this: the factors of its matrix are worth more.
+/// The step size and the matrix are kept if the step would grow by at most this factor.
 const MAX_RATIO_WITH_SAME_MATRIX: f64 = 1.2;
-/// A run still looks for its step size while each step is longer than the last by this factor.
+/// The run is in its starting phase while each step is longer than the last by this factor.
 const MIN_STARTING_GROWTH: f64 = 2.0;
 
-/// What has to be done before a step can be tried.
+/// The update of the matrix before the next attempt.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum MatrixUpdate {
     Nothing,
@@ -18,42 +18,42 @@ pub(super) enum MatrixUpdate {
     Jacobian,
 }
 
-/// A run on its way.
+/// The state of a run.
 pub(super) struct StepState<T> {
     span: Span<T>,
     direction: f64,
-    /// The longest step.
+    /// The maximum step size.
     pub max_step: f64,
-    /// The time that was reached, and the length of the step that is tried from there.
+    /// The current time, and the size of the step to be attempted.
     pub t: T,
     pub h: T,
     /// Whether this step ends the interval.
     pub is_last: bool,
-    /// The length of the last accepted step.
+    /// The size of the last accepted step.
     pub last_step_size: Option<T>,
-    /// The longest step that was accepted, or the first one.
+    /// The size of the longest accepted step, or of the first one.
     pub longest_so_far: T,
-    /// Whether the run still looks for its step size.
+    /// Whether the run is in its starting phase.
     pub is_starting: bool,
     pub matrix_update: MatrixUpdate,
     /// Whether the Jacobian is that of the start of the step.
     pub jacobian_is_current: bool,
-    /// Whether a step from here was tried in vain.
+    /// Whether a step from the current point was rejected.
     was_rejected: bool,
-    /// Whether the step is as long as the last one, so that the matrix is the same.
+    /// Whether the step size, and therefore the matrix, is that of the last step.
     has_same_step_size: bool,
     pub order: OrderSelection,
     pub newton: NewtonMonitor,
     pub controller: GustafssonController,
-    /// Why the last step was tried in vain.
+    /// The cause of the last rejection.
     pub last_refusal: Refusal,
-    /// How many steps were tried.
+    /// The number of attempts.
     pub attempts: usize,
-    /// How many matrices in a row were singular.
+    /// The number of successive singular matrices.
     pub singular_matrices: usize,
-    /// Whether the matrices of this step are pivoted as a whole.
+    /// Whether the matrices of this step are factorised with pivoting.
     pub uses_pivoting: bool,
-    /// Whether the planned elimination has lost its digits before.
+    /// Whether planned factors are tested before use, after one has failed.
     pub verifies_pivots: bool,
 }
 
@@ -85,7 +85,7 @@ impl<T: Real> StepState<T> {
         }
     }
 
-    /// With the first step of this length.
+    /// Starts with a first step of this size.
     pub fn set_first_step(&mut self, first: f64) {
         self.h = T::from_f64(self.direction * first);
         if self.overshoot(self.h * T::from_f64(1.0001)) >= 0.0 {
@@ -94,18 +94,18 @@ impl<T: Real> StepState<T> {
         self.longest_so_far = self.h.abs();
     }
 
-    /// How far a step leads beyond the end of the interval.
+    /// The length by which a step exceeds the interval.
     fn overshoot(&self, h: T) -> f64 {
         ((self.t + h - self.span.end) * T::from_f64(self.direction)).to_f64()
     }
 
-    /// Whether a second look is worth its work: at the first step, and after one that was tried in
-    /// vain.
+    /// Whether a second evaluation of a large estimate is worthwhile: in the first step, and after
+    /// a rejection.
     pub fn needs_second_estimate(&self) -> bool {
         self.last_step_size.is_none() || self.was_rejected
     }
 
-    /// Whether the stages of a step from here were not solved.
+    /// Whether an iteration from the current point has failed.
     pub fn is_unsolved(&self) -> bool {
         self.was_rejected && self.last_refusal == Refusal::NotConverged
     }
@@ -115,8 +115,8 @@ impl<T: Real> StepState<T> {
         if self.is_last { self.span.end } else { self.t + self.h }
     }
 
-    /// Counts a step with the matrix of the last one; whether the number of stages is worth a new
-    /// matrix instead.
+    /// Counts a step with the matrix of the last one; returns whether a higher order justifies a
+    /// new matrix.
     pub fn may_increase_order(&mut self, levels: usize) -> bool {
         if !core::mem::take(&mut self.has_same_step_size) {
             return false;
@@ -128,7 +128,7 @@ impl<T: Real> StepState<T> {
         grows
     }
 
-    /// The step is tried again, with another length.
+    /// Repeats the step with another size.
     pub fn retry(&mut self, factor: f64) {
         self.h = self.h * T::from_f64(factor);
         (self.was_rejected, self.is_last) = (true, false);
@@ -136,7 +136,7 @@ impl<T: Real> StepState<T> {
             if self.jacobian_is_current { MatrixUpdate::Factors } else { MatrixUpdate::Jacobian };
     }
 
-    /// The stages were not solved, or are those of a solution that is not smooth.
+    /// Rejects a step whose iteration failed, or that crosses a discontinuity.
     pub fn reject_failed_iteration(&mut self, failure: NewtonFailure) {
         self.last_refusal = match failure {
             NewtonFailure::NotFinite => Refusal::NotFinite,
@@ -171,21 +171,20 @@ impl<T: Real> StepState<T> {
         self.controller.step_size_factor(self.h.to_f64(), error, 1.0 / order, effort)
     }
 
-    /// Goes on from here as at the start of an interval, with the number of stages that is there.
+    /// Restarts from the current point with the present number of stages.
     pub fn restart(&mut self, t: T, first: f64) {
         *self = Self { order: self.order, attempts: self.attempts, ..Self::new(self.span, self.max_step) };
         self.t = t;
         self.set_first_step(first);
     }
 
-    /// The error is too large.
+    /// Rejects a step because of its error.
     pub fn reject_error(&mut self, factor: f64) {
         self.last_refusal = Refusal::Error;
         self.retry(if self.last_step_size.is_none() { 0.1 } else { factor });
     }
 
-    /// Chooses the next step after one that was accepted, whose iteration may have been so fast
-    /// that its Jacobian is kept.
+    /// Selects the next step after an accepted one; `fast`: the Jacobian is reused.
     pub fn advance(&mut self, end: T, factor: f64, fast: bool) {
         let size = self.h.to_f64().abs();
         self.is_starting = self.is_starting && factor > MIN_STARTING_GROWTH;
@@ -198,7 +197,7 @@ impl<T: Real> StepState<T> {
             next = next.min(size);
         }
         let next_h = T::from_f64(self.direction * next);
-        // What rounding leaves of the interval is no step.
+        // A remainder of the interval below rounding is no step.
         let slack = 16.0 * T::EPSILON * end.abs().max(self.span.end.abs()).to_f64();
         self.matrix_update = if fast { MatrixUpdate::Factors } else { MatrixUpdate::Jacobian };
         if self.overshoot(next_h) >= -slack {

@@ -1,7 +1,8 @@
-//! Intervals side by side: one in each lane of registers, through the same engine as a single one.
+//! Groups of intervals for implicit methods: one interval in each SIMD lane, computed by the engine
+//! of a single interval.
 //!
-//! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy
-//! their equations; lanes never mix, so that one that fails takes nobody with it.
+//! Every lane has its own convergence status and its own check of derivatives. Lanes do not mix, so
+//! that a failing lane does not affect the others.
 
 use crate::batch::intervals::Interval;
 use crate::batch::lanes::{MAX_LANES, MaskedResult, Unpack, all_lanes_true, pack};
@@ -25,22 +26,22 @@ use core::slice::{from_mut, from_ref};
 type CallStorage<V> = <Heap as Memory>::Nominal<V>;
 type TapeStorage<V> = <Heap as Memory>::Tape<V>;
 
-/// A group of intervals, and the memory that it needs.
+/// A group of intervals and its memory.
 pub struct Group<M: Dae, E: Lanes, const S: usize> {
     options: Options,
     coefficients: Coefficients<E, S>,
     statistics: Statistics,
     work: CallStorage<StageWorkspace<M, E, S>>,
     steps: TapeStorage<Step<M, E, S>>,
-    /// Whether start values were given.
+    /// Whether the user gave start values.
     given: bool,
-    /// The warm start, or solutions.
+    /// The stages of a warm start, or of solutions.
     record: TapeStorage<Step<M, E, S>>,
-    /// Whether all lanes have stages of earlier calls, and whether those are solutions.
+    /// Whether all lanes have stages of earlier calls; `solved` is whether these are solutions.
     warm: bool,
     solved: bool,
     lambda: CallStorage<ArrayX<M, E>>,
-    /// Weights of the algebraic states at the start, and whether there are any.
+    /// Weights of the initial algebraic states; valid if `has_nu`.
     nu: CallStorage<VectorZ<M, E>>,
     has_nu: bool,
     forward: CallStorage<ForwardMemory<M, E, S>>,
@@ -49,7 +50,7 @@ pub struct Group<M: Dae, E: Lanes, const S: usize> {
     tape: TapeStorage<HessianStep<M, E, S>>,
 }
 
-/// What a pass over the steps works in.
+/// The data of a pass over the steps.
 struct StepPass<'a, M: Dae, E: Lanes, const S: usize> {
     options: &'a Options,
     coefficients: &'a Coefficients<E, S>,
@@ -59,7 +60,7 @@ struct StepPass<'a, M: Dae, E: Lanes, const S: usize> {
     from: InitialGuess<'a, M, E, S>,
 }
 
-/// Opens what every pass needs.
+/// Borrows the data of a pass.
 macro_rules! pass {
     ($group:ident) => {{
         $group.statistics = Statistics::default();
@@ -155,7 +156,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             pack(&[*given; MAX_LANES], to);
         }
         gather(intervals, <Heap>::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
-        // All of them have some, or none.
+        // Either all intervals have weights, or none.
         self.has_nu = intervals.iter().all(|interval| !interval.nu.is_empty());
         if self.has_nu {
             gather(intervals, <Heap>::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
@@ -206,7 +207,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         let adjoint = <Heap>::nominal(&mut self.adjoint)?;
         let lambda = <Heap>::nominal(&mut self.lambda)?;
         let count = step_pass.steps.len();
-        // On the way forth only the last step is linearised: it is where the way back begins.
+        // The forward pass linearises only the last step, where the backward pass begins.
         let mut converged = step_pass.integrate(&mut [], |pass, n, step, exact, _| {
             if n + 1 == count {
                 pass.linearize(None, n, step, exact);
@@ -245,7 +246,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
                 step,
                 exact,
             );
-            // That of the last step is still there on the way back.
+            // The backward pass finds the linearisation of the last step in the workspace.
             if !(HessianStep::<M, E, S>::FACTORS_ON_TAPE || last) {
                 record.store_linearization(pass.work);
             }
@@ -283,8 +284,8 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
 }
 
 impl<M: Dae, E: Lanes, const S: usize> StepPass<'_, M, E, S> {
-    /// The steps of the interval, with `after` called after each, with what is remembered of it, if
-    /// anything is; whether all went well, lane by lane.
+    /// Integrates over the steps of the interval; calls `after_step` after each, with its record if
+    /// there is one. Returns the lanes in which all steps succeeded.
     fn integrate(
         &mut self,
         records: &mut [HessianStep<M, E, S>],

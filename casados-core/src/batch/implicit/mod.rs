@@ -1,4 +1,4 @@
-//! Implicit methods.
+//! Implicit methods in batches.
 
 mod group;
 
@@ -14,7 +14,7 @@ use crate::result::{Forward, ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real};
 use crate::tableau::{Method, Tableau};
 
-/// Integrators of a memory, with the groups that it has.
+/// Implements `Single` for the integrators of a memory type, with its groups.
 macro_rules! single {
     ([$M:ident, $S:ident] $memory:ty { type Group<$E:ident> = $group:ty; const SUPPORTS_GROUPS = $together:expr; }) => {
         impl<$M: Dae, B, const $S: usize, T: Real> Single for Integrator<M, B, S, T, $memory> {
@@ -30,15 +30,14 @@ macro_rules! single {
                 Self::build(*options, *tableau)
             }
 
-            /// Factors, where Newton's method takes those of the shared Jacobian or not, and
-            /// right-hand sides.
+            /// The factors of Newton's method, shared or stage-wise, and the right-hand sides.
             fn working_set<E: Lanes>(options: &Options, columns: usize) -> usize {
                 let Newton { fixed_iterations, jacobian, .. } = &options.newton;
                 let shared = S > 2
                     && fixed_iterations.is_none()
                     && jacobian.is_adaptive()
                     && !M::STRUCTURE.linear_in_state;
-                // Derivatives take the factors of each stage in any case.
+                // Derivatives always use one Jacobian per stage.
                 let factors = if shared && columns == 0 {
                     size_of::<M::Factors<[E::Demoted; S]>>()
                 } else {
@@ -91,12 +90,12 @@ macro_rules! single {
     };
 }
 
-// Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
+// Without a plan the whole matrix is pivoted, in a different order in each lane.
 single!([M, S] Heap {
     type Group<E> = Group<M, E, S>;
     const SUPPORTS_GROUPS = M::STRUCTURE.elimination.has_plan();
 });
-// A group would have kernels of its own to compile.
+// A group would require further kernels per model.
 single!([M, S] Shared {
     type Group<E> = NoGroup;
     const SUPPORTS_GROUPS = false;

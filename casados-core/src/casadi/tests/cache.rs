@@ -1,4 +1,4 @@
-//! What is remembered, and what is forgotten.
+//! Storage and replacement of results.
 
 use crate::casadi::cache::{Cache, ComputedDerivatives, IntervalResults, key};
 use alloc::vec;
@@ -13,7 +13,7 @@ fn store(cache: &mut Cache<()>, input: f64, answer: &mut IntervalResults<()>) {
     store_as(cache, key(&[input]), input, answer);
 }
 
-/// Stores what was asked for, with the derivatives that there are.
+/// Stores results, with the derivatives that were computed.
 fn store_as(cache: &mut Cache<()>, key: u64, input: f64, answer: &mut IntervalResults<()>) {
     let second = answer.lambda.get().map(|lambda| self::key(lambda));
     let given = ComputedDerivatives { jacobian: answer.jacobian.get().is_some(), second };
@@ -36,7 +36,7 @@ fn the_oldest_inputs_are_forgotten() {
     }
     store(&mut cache, 4.0, &mut results_with_value(40.0));
     assert!(find(&cache, 2.0).is_none() && find(&cache, 3.0).is_some());
-    // Bits count: zeros of both signs are two inputs.
+    // Bits are compared: positive and negative zero differ.
     store(&mut cache, 0.0, &mut results_with_value(0.0));
     assert!(find(&cache, -0.0).is_none() && find(&cache, 0.0).is_some());
     let mut none = Cache::new(0, true);
@@ -44,7 +44,7 @@ fn the_oldest_inputs_are_forgotten() {
     assert!(find(&none, 1.0).is_none());
 }
 
-/// Inputs of one key take the place of each other, and are never taken for each other.
+/// Inputs with equal keys replace each other, and are never confused.
 #[test]
 fn equal_keys_are_no_equal_inputs() {
     let mut cache = Cache::new(2, true);
@@ -60,7 +60,7 @@ fn equal_keys_are_no_equal_inputs() {
 #[test]
 fn keys_of_like_inputs_differ() {
     let mut keys = std::collections::HashSet::new();
-    // Few bits, at every place, zeros behind them, and orders.
+    // Inputs with few bits, at every place, with trailing zeros, and in all orders.
     for length in 1..=9 {
         for place in 0..length {
             for value in [1.0, -1.0, 2.0, 0.5, -0.0, f64::from_bits(1)] {
@@ -84,7 +84,7 @@ fn answers_to_the_same_inputs_are_joined() {
     store(&mut cache, 1.0, &mut gradient);
     let entry = find(&cache, 1.0).unwrap();
     assert_eq!((entry.value.get().unwrap()[0], entry.gradient.get().unwrap()[0]), (1.0, 50.0));
-    // A Hessian of other multipliers takes the gradient of the former ones along.
+    // A Hessian for other multipliers replaces the gradient for the former ones.
     let mut hessian = IntervalResults::default();
     hessian.lambda.set(1)[0] = 6.0;
     hessian.hessian.set(1)[0] = 600.0;
@@ -110,7 +110,7 @@ fn derivatives_are_kept_from_when_some_are_asked_for_again() {
         store(&mut cache, 1.0, &mut derivative(5.0));
         let entry = find(&cache, 1.0).unwrap();
         assert!(entry.value.get().is_some() && entry.jacobian.get().is_none());
-        // Of other inputs nobody has got any.
+        // Derivatives for other inputs were not computed before.
         cache.record_miss(key(&[2.0]), &[2.0], true, Some(&[5.0]));
         store(&mut cache, 1.0, &mut derivative(5.0));
         assert!(find(&cache, 1.0).unwrap().hessian.get().is_none());

@@ -1,4 +1,4 @@
-//! The pool of memories, and pointers.
+//! The pool of memories, and the functions with pointers.
 #![allow(unsafe_code)]
 
 use crate::casadi::ffi::{self, Side};
@@ -11,10 +11,10 @@ use alloc::vec::Vec;
 use core::ptr::{null, null_mut};
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// The sum of two inputs, of three numbers and of one; it fails below zero and panics above 100.
+/// The sum of two inputs, for three numbers and for one; it fails below zero and panics above 100.
 struct SumLibrary(Vec<Signature>, &'static AtomicUsize);
 
-/// What a thread has, which counts itself.
+/// The memory of a thread, which counts its instances.
 struct Counted(&'static AtomicUsize);
 
 impl Drop for Counted {
@@ -70,7 +70,7 @@ fn call(library: &Library<SumLibrary>, inputs: [Option<&[f64]>; 2], id: i32) -> 
     let (mut c, mut d) = ([f64::NAN; 3], [f64::NAN; 1]);
     let arguments = inputs.map(|input| input.map_or(null(), <[f64]>::as_ptr));
     let mut results = [c.as_mut_ptr(), d.as_mut_ptr()];
-    // SAFETY: as many pointers as there are inputs and outputs, to arrays of their lengths.
+    // SAFETY: as many pointers as inputs and outputs, to arrays of their lengths.
     let status = unsafe { ffi::evaluate(library, 0, arguments.as_ptr(), results.as_mut_ptr(), id) };
     (status == 0).then_some((c, d))
 }
@@ -79,17 +79,17 @@ fn call(library: &Library<SumLibrary>, inputs: [Option<&[f64]>; 2], id: i32) -> 
 fn pointers_become_calls() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
     static LIBRARY: Library<SumLibrary> = Library::new(|| Ok(SumLibrary::new(&WORKERS)));
-    ffi::refer(&LIBRARY);
+    ffi::add_reference(&LIBRARY);
     let id = ffi::check_out(&LIBRARY);
     let (a, b) = ([1.0, 2.0, 3.0], [10.0]);
     assert_eq!(call(&LIBRARY, [Some(&a), Some(&b)], id), Some(([11.0, 12.0, 13.0], [6.0])));
     assert_eq!(call(&LIBRARY, [None, Some(&b)], id), Some(([10.0; 3], [0.0])));
-    // No pointers at all.
+    // Null pointers for all arrays.
     // SAFETY: null is allowed for both.
     assert_eq!(unsafe { ffi::evaluate(&LIBRARY, 0, null(), null_mut(), id) }, 0);
     // SAFETY: as above; there is no such function.
     assert_eq!(unsafe { ffi::evaluate(&LIBRARY, 9, null(), null_mut(), id) }, 1);
-    // Failures, and a panic; then it works again.
+    // Failures and a panic; later calls succeed.
     assert_eq!(call(&LIBRARY, [Some(&a), Some(&[-1.0])], id), None);
     assert_eq!(call(&LIBRARY, [Some(&a), Some(&[101.0])], id), None);
     assert_eq!(call(&LIBRARY, [Some(&a), None], id), Some((a, [6.0])));
@@ -99,19 +99,19 @@ fn pointers_become_calls() {
     assert_eq!(ffi::count(&LIBRARY, 0, Side::Input), 2);
     assert_eq!(ffi::count(&LIBRARY, 1, Side::Input), 0);
     assert_eq!(ffi::integrations(&LIBRARY), 7);
-    // SAFETY: the name ends with zero, and lives until the last reference is gone.
+    // SAFETY: the name is terminated by zero, and lives until the last reference is dropped.
     let name = unsafe { core::ffi::CStr::from_ptr(ffi::name(&LIBRARY, 0, Side::Output, 1)) };
     assert_eq!(name, c"d");
     assert!(ffi::name(&LIBRARY, 0, Side::Output, 2).is_null());
     assert!(ffi::sparsity(&LIBRARY, 0, Side::Input, -1).is_null());
-    // SAFETY: a pattern of a dense vector is three numbers.
+    // SAFETY: the pattern of a dense vector consists of three numbers.
     let pattern = unsafe { core::slice::from_raw_parts(ffi::sparsity(&LIBRARY, 0, Side::Input, 0), 3) };
     assert_eq!(pattern, [3, 1, 1]);
     ffi::release(&LIBRARY, id);
     assert_eq!(call(&LIBRARY, [Some(&a), None], id), None);
-    // With the last reference everything goes.
+    // The last reference drops everything.
     assert_eq!(WORKERS.load(Ordering::Relaxed), 1);
-    ffi::forget(&LIBRARY);
+    ffi::remove_reference(&LIBRARY);
     assert_eq!(WORKERS.load(Ordering::Relaxed), 0);
 }
 
@@ -137,7 +137,7 @@ fn threads_have_memory_of_their_own() {
     assert_eq!(WORKERS.load(Ordering::Relaxed), 4);
 }
 
-/// A panic of what makes the client is a library without functions.
+/// If the construction of the client panics, the library has no functions.
 #[test]
 fn a_client_that_cannot_be_made() {
     static LIBRARY: Library<SumLibrary> = Library::new(|| panic!("on purpose"));
@@ -146,7 +146,7 @@ fn a_client_that_cannot_be_made() {
     assert_eq!(ffi::integrations(&LIBRARY), 0);
 }
 
-/// What cannot be made has no functions, and says why.
+/// If the construction fails, there are no functions, and the cause is written.
 #[test]
 fn functions_that_have_no_memory() {
     static LIBRARY: Library<SumLibrary> =

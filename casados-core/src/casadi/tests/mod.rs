@@ -1,4 +1,4 @@
-//! What needs no integrator: patterns, places of numbers, names.
+//! Tests without an integrator: patterns, indices, names.
 
 mod cache;
 mod interface;
@@ -32,7 +32,7 @@ fn patterns_are_compressed_columns() {
     let (_, order) = Sparsity::vector(2).diagonal(1).transposed();
     assert_eq!(order, [0, 1]);
     let full = Sparsity::new(2, 2, |_, _| true);
-    // Row by row, where entries are column by column.
+    // Row by row, from entries in column-major order.
     assert_eq!(full.transposed().1, [0, 2, 1, 3]);
     let upper = Sparsity::new(2, 2, |row, column| row <= column);
     assert_eq!(upper.symmetric(), (full, vec![0, 1, 1, 2]));
@@ -63,7 +63,7 @@ const CASCADE_DIMENSIONS: Dimensions = Dimensions { nx: 3, nz: 0, nw: 4 };
 fn implicit_methods_depend_on_all_that_leads_there() {
     let variables = dependence::variables(CASCADE_DIMENSIONS, CASCADE, None);
     let states = variables.block(3..6, 0..4);
-    // The last state is no argument of anybody.
+    // No equation depends on the last state.
     let expected = [[1, 0, 0, 1], [1, 1, 0, 1], [1, 1, 1, 1]];
     assert_eq!(states, Sparsity::new(3, 4, |row, column| expected[row][column] == 1));
 }
@@ -78,15 +78,15 @@ fn explicit_methods_reach_an_equation_further_with_each_evaluation() {
     assert_eq!(states(3), dependence::variables(CASCADE_DIMENSIONS, CASCADE, None).block(3..6, 0..4));
 }
 
-/// `z₀ = x₀` is equation 1, `ẋ₀ = z₁` is 2, and `z₁ = z₀ p` is 0: no equation is where its unknown
-/// is.
+/// `z₀ = x₀` is equation 1, `ẋ₀ = z₁` is 2, and `z₁ = z₀ p` is 0: no equation has the index of its
+/// unknown.
 #[test]
 fn equations_are_matched_with_unknowns() {
     let jacobian = Pattern { rows: &[0, 0, 0, 1, 1, 2, 2], columns: &[2, 3, 5, 1, 2, 0, 3] };
     let dimensions = Dimensions { nx: 1, nz: 2, nw: 3 };
     let variables = dependence::variables(dimensions, jacobian, None);
     assert_eq!(variables.row(2), [true, false, true]);
-    // By way of the state, which depends on the other one.
+    // Through the state, which depends on the other one.
     assert_eq!(variables.row(1), [true, false, true]);
     assert_eq!(variables.row(4), [false, true, false]);
     let mut hessian = Dependence::zero(3, 3);
@@ -103,7 +103,7 @@ fn second_derivatives_lie_in_blocks() {
     assert_eq!((blocks.block_layout(1, 2), blocks.block_layout(2, 1)), ([13, 1, 1], [13, 1, 1]));
     assert_eq!((blocks.block_layout(0, 2), blocks.block_layout(2, 0)), ([7, 1, 2], [7, 2, 1]));
     assert_eq!(blocks.block_layout(2, 2), [16, 1, 3]);
-    // Every place is that of one pair, or of both orders of one.
+    // Every index belongs to one pair, or to both orders of a pair.
     let mut count = [0; 25];
     (0..6).for_each(|i| (0..6).for_each(|j| count[blocks.index(i, j)] += 1));
     let expected = [vec![1; 4], vec![2; 2], vec![1], vec![2; 9], vec![1; 9]].concat();
@@ -124,7 +124,7 @@ fn names_make_groups() {
         ("u_gr_e", true, 3..4),
     ];
     assert_eq!(said, expected);
-    // Two groups of one name cannot be told apart.
+    // The second of two groups with one name is dropped.
     assert_eq!(groups([&["x.a.b", "x.c", "x.a_b"], &[]]).len(), 2);
     assert!(groups([&["x[0]", "x[1]"], &["u[0]"]]).is_empty());
 }
@@ -133,8 +133,8 @@ fn names_make_groups() {
 fn matrices_are_sums_of_numbers_of_stages() {
     let node = |index| EntryTerm::Node { stage: 0, index };
     let interval = |stage, block, index| EntryTerm::Interval { stage, block, index };
-    // Column 0 at a distance of two, an entry of two intervals, a node and a constant, a constant
-    // alone; and entries one behind the other of one block and of two.
+    // Column 0 with stride two, an entry of two intervals, a node and a constant, a constant alone;
+    // and successive entries of one block and of two.
     let terms = vec![
         ([0, 1], EntryTerm::Constant(100.0)),
         ([0, 1], node(2)),
@@ -160,7 +160,7 @@ fn matrices_are_sums_of_numbers_of_stages() {
     };
     let expected = [10.0, 30.0, 50.0, 1065.0, -10.0, 70.0, 80.0, 90.0];
     assert_eq!(write(&matrix, &[4.0, 9.0]), expected);
-    // Written again, and where a block is not there: zeros.
+    // Written again: zeros for a missing block.
     assert_eq!(write(&matrix, &[4.0, 9.0]), expected);
     assert_eq!(write(&matrix, &[]), [10.0, 30.0, 50.0, 1025.0, -10.0, 70.0, 80.0, 0.0]);
     entries.zero_node_terms(0, &mut matrix);
@@ -198,7 +198,7 @@ fn names_and_places_of_two_intervals() {
     assert_eq!(second.0.inputs[3].sparsity.compressed(), [1, 2, 0, 0, 0]);
 
     let places = |output: &Output| output.entries.iter().map(|Entry(place)| *place).collect::<Vec<_>>();
-    // An interval has 1 × 3 derivatives of first order, column by column, and 3 × 3 of second.
+    // An interval has 1 × 3 derivatives of first order, in column-major order, and 3 × 3 of second.
     assert_eq!(jac.0.outputs[0].sparsity.entries(), [(0, 1), (1, 3)]);
     assert_eq!((places(&jac.1[0]), jac.1[0].source), (vec![1, 4], Source::Jacobian));
     assert_eq!(places(&jac.1[1]), [2, 5]);

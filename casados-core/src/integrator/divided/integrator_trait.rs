@@ -1,4 +1,4 @@
-//! The calls of an integrator whose intervals are divided.
+//! The trait `Integrator` for divided intervals.
 
 use super::super::chain_rule;
 use super::{Divided, HessianMemory, Integrator, as_dyn_integrand};

@@ -1,4 +1,4 @@
-//! An integrator whose intervals are divided: several calls are one.
+//! An integrator with divided intervals: one call is a sequence of calls for its parts.
 //!
 //! With `V_k = dx_k/dw` at the start of part `k`, its derivatives `(A, B)` by `x_k` and by
 //! `(u, p)`, its adjoint `λ_k`, and `D_k = d(x_k, u, p)/dw`:
@@ -25,13 +25,13 @@ use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// An integrator each of whose intervals is divided into `N` parts of the same length, one call
-/// after the other. What comes out, with its derivatives of first and second order and with
-/// integrals, is that of the whole interval.
+/// An integrator that divides each interval into `N` parts of equal length, one call for each.
+/// Results, derivatives of first and second order, and integrals are those of the whole interval.
 ///
-/// It is for what an integrator does once a call, as [`Projected`](crate::Projected) does: with one
-/// step for each part the projection is that of every step. `adjoint` and `hessian` integrate
-/// twice. Steps in errors are counted from the start of a part.
+/// It is intended for operations once per call, such as the projection of
+/// [`Projected`](crate::Projected): with one step per part the projection is applied after every
+/// step. `adjoint` and `hessian` integrate twice. Step numbers in errors are counted from the start
+/// of a part.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -67,7 +67,7 @@ type NominalStorage<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
 #[zeroable(bound = "")]
 struct NominalMemory<M: Dae, T: Real, const N: usize> {
     result: Nominal<M, T>,
-    /// The state at the start of each part.
+    /// The initial state of each part.
     states: [VectorX<M, T>; N],
 }
 
@@ -75,7 +75,7 @@ struct NominalMemory<M: Dae, T: Real, const N: usize> {
 #[zeroable(bound = "")]
 struct ForwardMemory<M: Dae, T: Real> {
     result: Forward<M, T>,
-    /// `V` at the start of a part, and at its end.
+    /// `V` at the start and at the end of a part.
     v: [StateSensitivities<M, T>; 2],
 }
 
@@ -92,13 +92,14 @@ struct HessianMemory<M: Dae, T: Real, const N: usize> {
     result: Hessian<M, T>,
     /// `V` at the start of each part.
     start_sensitivities: [StateSensitivities<M, T>; N],
-    /// `∇²(λᵀx)` of a part times `D`, and the sum of all parts.
+    /// `∇²(λᵀx)` of a part times `D`; `sum` is the sum over all parts.
     product: FullHessian<M, T>,
     sum: FullHessian<M, T>,
 }
 
 impl<I: Integrator, const N: usize> Divided<I, N> {
-    /// Divides the intervals of an integrator. The time is the one that is set here, or zero.
+    /// Returns an integrator with divided intervals. Its time is set by `set_time`, and zero by
+    /// default.
     pub fn new(integrator: I) -> Self {
         const { assert!(N > 0, "an interval has at least one part") }
         Self {
@@ -112,30 +113,30 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         }
     }
 
-    /// The integrator of the parts.
+    /// Returns the integrator of the parts.
     pub fn integrator(&mut self) -> &mut I {
         &mut self.integrator
     }
 
-    /// Before a call.
+    /// Begins a call.
     fn begin_call(&mut self, h: I::Number) -> Result<(), Error> {
         self.statistics = Statistics::default();
         check_input(Argument::H, &[h])
     }
 
-    /// Before a part: its time, and its length.
+    /// Sets the time of a part; returns its length.
     fn begin_part(&mut self, part: usize, h: I::Number) -> Result<I::Number, Error> {
         let count = I::Number::from_f64(N as f64);
         self.integrator.set_time(self.time + h * I::Number::from_f64(part as f64) / count)?;
         Ok(h / count)
     }
 
-    /// After a part.
+    /// Adds the statistics of a part.
     fn add_part_statistics(&mut self) {
         self.statistics.add(&self.integrator.statistics());
     }
 
-    /// The solution, with the states where parts start.
+    /// Computes the solution, and stores the initial states of the parts.
     fn solve_parts(
         &mut self,
         x0: &StateOf<Self>,
@@ -160,7 +161,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         Ok(())
     }
 
-    /// The solution and its derivatives, with what `keep` wants to know where parts start.
+    /// Computes the solution and its derivatives; calls `on_part_start` at the start of each part.
     fn differentiate_parts(
         &mut self,
         x0: &StateOf<Self>,
@@ -206,7 +207,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     }
 }
 
-/// The integrand of a part.
+/// Returns the integrand of a part.
 fn chained_integrand<'a, M: Dae, T: Real>(
     integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a StateSensitivities<M, T>>,

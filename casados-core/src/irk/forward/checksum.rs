@@ -1,16 +1,15 @@
-//! Weighted sums of the derivatives of the stages over all directions, by which they are checked
-//! (`backward_error`, `refine`).
+//! Weighted sums of the stage derivatives over all directions, for the checks in `backward_error`
+//! and `refine`.
 
 use crate::irk::directions::checksum_weight;
 use crate::linalg::{Arithmetic, PanelRow, Prefetch, Visitor};
 use crate::scalar::{Field, each};
 
-/// So many accumulators a sum over all columns has; of numbers that are registers themselves only
-/// the first is used.
+/// Number of accumulators of a sum over all columns. Sums of SIMD registers use the first one only.
 pub(in crate::irk) const ACCUMULATORS: usize = 4;
 
-/// Whether sums have one accumulator: those of other rows are computed meanwhile, and its memory is
-/// written once for each row of a panel.
+/// Whether sums have one accumulator: the sums of other rows hide the latency of its additions, and
+/// it is stored once per row of a panel.
 const fn uses_one_accumulator<E>() -> bool {
     size_of::<E>() > 8
 }
@@ -22,7 +21,7 @@ pub(in crate::irk) fn sum_accumulators<E: Field>(accumulators: &[E; ACCUMULATORS
     if const { uses_one_accumulator::<E>() } { a } else { (a + b) + (c + d) }
 }
 
-/// The weights of some columns, with another sign.
+/// The negative weights of the columns of a panel.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(in crate::irk) fn minus_weights<E: Field, const W: usize>(
     column: usize,
@@ -35,11 +34,11 @@ pub(in crate::irk) fn minus_weights<E: Field, const W: usize>(
     weights
 }
 
-/// Sums over all columns, of which some are shown.
+/// Adds panel rows to the sums over all columns, as a visitor of solved rows.
 pub(in crate::irk) struct ChecksumVisitor<'a, E, const S: usize, const W: usize> {
     pub sums: &'a mut [[[E; ACCUMULATORS]; S]],
     pub minus_weights: &'a [E; W],
-    /// Where the next panel will be written.
+    /// Prefetch target: the memory of the next panel.
     pub prefetch: Prefetch<'a, E>,
 }
 
@@ -65,7 +64,7 @@ impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for ChecksumVisi
     }
 }
 
-/// A sum over no columns.
+/// Sets the accumulators to zero.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(in crate::irk) fn clear_accumulators<E: Field>(accumulators: &mut [E; ACCUMULATORS]) {
     let [first, others @ ..] = accumulators;
@@ -75,7 +74,7 @@ pub(in crate::irk) fn clear_accumulators<E: Field>(accumulators: &mut [E; ACCUMU
     }
 }
 
-/// `accumulators += weights · row`, as far apart as the accumulators are.
+/// `accumulators += weights · row`; column `c` goes to accumulator `c` modulo their number.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     accumulators: &mut [E; ACCUMULATORS],
@@ -88,7 +87,7 @@ pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
         return;
     }
     let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
-    // In registers: the optimiser cannot know that they do not overlap.
+    // Local copies stay in registers: the optimiser cannot prove that the arguments do not overlap.
     let mut accumulated = *accumulators;
     each!(n < W / ACCUMULATORS => { A::subtract_products(&mut accumulated, &weights[n], &row[n]); });
     each!(n < W % ACCUMULATORS => { accumulated[n] = A::subtract(accumulated[n], last_weights[n], last[n]); });

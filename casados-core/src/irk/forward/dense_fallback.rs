@@ -1,4 +1,4 @@
-//! Forward sensitivities where the whole matrix was pivoted.
+//! Forward sensitivities by the dense fallback.
 
 use super::sweep::ForwardSweep;
 use crate::irk::directions::{Directions, panel_mut, panels};
@@ -9,7 +9,7 @@ use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
-    /// Solves by the factors of the whole matrix, column by column.
+    /// Solves column by column, with the factors of the whole matrix.
     pub(super) fn solve_columns<D: Directions<E>, F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -28,9 +28,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
     }
 }
 
-// Seldom needed: loops of their own are not unrolled.
+// Executed rarely: loops of their own are not unrolled.
 
-/// A column of a panel.
+/// Reads a column of a panel.
 #[inline(never)]
 fn read_column<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
     for (to, row) in to.iter_mut().zip(rows) {
@@ -40,7 +40,7 @@ fn read_column<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut
     }
 }
 
-/// The same back into the panel.
+/// Writes a column of a panel.
 #[inline(never)]
 pub(super) fn write_column<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
     for (from, row) in from.iter().zip(rows) {

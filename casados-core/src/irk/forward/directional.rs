@@ -25,7 +25,7 @@ pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     seeds: ArrayW<M, [T; C]>,
 }
 
-/// The memory of sensitivities in directions, of any number.
+/// The memory of sensitivities in any number of directions.
 pub struct Directionals<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);
 impl<M: Dae, T: Real, const S: usize> Family for Directionals<M, T, S> {
     type Of<const C: usize> = DirectionalMemory<M, T, S, C>;
@@ -47,7 +47,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         }
     }
 
-    /// After a step that is linearised.
+    /// Differentiates a linearised step.
     ///
     /// # Errors
     /// [`Error::Singular`]
@@ -89,7 +89,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         Ok(())
     }
 
-    /// The derivatives of the stages of the last step, directions innermost.
+    /// The derivatives of the stages of the last step, with directions innermost.
     #[cfg(feature = "alloc")]
     pub(crate) fn stage_derivatives(&self) -> &[T] {
         self.sweep.dy()

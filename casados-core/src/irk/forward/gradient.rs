@@ -1,4 +1,4 @@
-//! The gradient that forward sensitivities have in them.
+//! Gradients computed from forward sensitivities.
 
 use crate::error::Error;
 use crate::finite::check_gradient;
@@ -8,7 +8,7 @@ use crate::result::ForwardAdjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::Matrix;
 
-/// `∇(λᵀx)` from the derivatives of `x`.
+/// Computes `∇(λᵀx)` from the derivatives of `x`.
 pub(crate) fn gradient_product<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lambda: &[E]) {
     let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = result;
     for (matrix, gradient) in [
@@ -20,7 +20,7 @@ pub(crate) fn gradient_product<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, 
     }
 }
 
-/// `∇(λᵀx)` from the derivatives of `x`.
+/// Computes `∇(λᵀx)` from the derivatives of `x`.
 ///
 /// # Errors
 /// [`Error::Overflow`]
@@ -33,10 +33,10 @@ pub(crate) fn checked_gradient<M: Dae, T: Real>(
 }
 
 kernels! {
-    /// `gradientᵀ = λᵀ S`, with `S` column after column.
+    /// `gradientᵀ = λᵀ S`, with `S` in column-major order.
     fn product [E: Lanes] [E] <A>(lambda: &'k [E], matrix: &'k [E], gradient: &'k mut [E]) {
         gradient.fill(E::from_f64(0.0));
-        // A model without states has no columns to go through.
+        // `max(1)`: the chunk length is positive for a model without states too.
         let columns = matrix.chunks_exact(lambda.len().max(1));
         for (gradient, column) in gradient.iter_mut().zip(columns) {
             for (&lambda, &s) in lambda.iter().zip(column) {

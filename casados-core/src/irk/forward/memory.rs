@@ -1,4 +1,4 @@
-//! The forward pass in all directions `w = (x₀, u, p)` side by side, and its memory.
+//! The forward pass in all directions `w = (x₀, u, p)`, and its memory.
 
 use super::matrices::DerivativeMatrices;
 use super::sweep::{ForwardSweep, LinearizedStep, StepOutputs};
@@ -23,18 +23,19 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) pass: ForwardPass<M, T, S>,
 }
 
-/// A pass over the steps, which writes to results elsewhere.
+/// A pass over the steps that writes to a result of the caller.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
     pub(crate) sweep: ForwardSweep<M, T, ArrayC<M, T>, S>,
-    /// Zero if all derivatives of `z` are finite, else NaN.
+    /// Zero if all derivatives of `z` are finite, otherwise NaN.
     finite_indicator: [T; 1],
 }
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
-    /// A step that is linearised, by the factors that were `kept` or are there, as
-    /// [`ForwardPass::step`]; whether the derivatives satisfy their equations.
+    /// Differentiates a linearised step with the factors of `stored_linearization` or of the
+    /// workspace, as [`ForwardPass::step`]; returns the lanes in which the derivatives satisfy
+    /// their equations.
     pub(crate) fn differentiate_step<F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -53,7 +54,7 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         valid
     }
 
-    /// What a step contributes to derivatives of `z`.
+    /// Writes the derivatives of `z` that a step determines.
     fn write_algebraic_outputs<F: Fallback>(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -72,8 +73,8 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         }
     }
 
-    /// What is left to be written after the last step. Zero if all derivatives are finite, else
-    /// NaN.
+    /// Writes the remaining derivatives after the last step. Returns zero if all derivatives are
+    /// finite, otherwise NaN.
     pub(crate) fn finish_unchecked<F: Fallback>(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
         to.nominal = *nominal;
         DerivativeMatrices::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp)
@@ -83,12 +84,12 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
     }
 }
 
-/// Which step of how many.
+/// The index of a step and the number of steps.
 #[derive(Clone, Copy)]
 pub(crate) struct StepIndex {
     pub n: usize,
     pub count: usize,
-    /// Whether the result may be in no cache.
+    /// Whether the memory of the result may be in no cache.
     pub prefetch_output: bool,
 }
 
@@ -97,7 +98,7 @@ impl StepIndex {
         self.n + 1 == self.count
     }
 
-    /// The step, which goes through in all directions.
+    /// The linearised step with all directions.
     fn linearized<'a, M: Dae, E: Lanes, const S: usize, F: Fallback>(
         self,
         stored_linearization: Option<&'a Linearization<M, E, S, F>>,
@@ -111,7 +112,7 @@ impl StepIndex {
         }
     }
 
-    /// What the step writes.
+    /// The outputs of the step.
     fn outputs<'a, M: Dae, E: Lanes, F: Fallback>(
         self,
         stage_sensitivities: Option<&'a mut [E]>,
@@ -125,8 +126,9 @@ impl StepIndex {
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
-    /// After a step that is linearised; refined where digits were lost, if that is asked for. The
-    /// last one writes derivatives of `x` to the result, the first and the last those of `z`.
+    /// Differentiates a linearised step; with `REFINED`, refines derivatives that lost digits. The
+    /// last step writes the derivatives of `x` to the result, the first and the last step those of
+    /// `z`.
     ///
     /// # Errors
     /// [`Error::Singular`]
@@ -155,7 +157,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         Ok(())
     }
 
-    /// What is left to be written after the last step.
+    /// Writes the remaining derivatives after the last step.
     ///
     /// # Errors
     /// [`Error::Overflow`]
@@ -165,7 +167,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         step: usize,
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
-        // Only where one is not finite it is looked for.
+        // The non-finite value is searched for only if there is one.
         if self.finish_unchecked::<F>(nominal, to).is_finite() {
             Ok(())
         } else {
@@ -175,7 +177,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// Derivatives at a point of the last step.
+    /// Computes derivatives at a point of the last step.
     pub(crate) fn interpolate<F: Fallback>(&mut self, weights: &[T; S], lagrange: &[T; S]) {
         let Self { dense, pass: ForwardPass { sweep, .. }, .. } = self;
         let (plan, directions) = (F::plan::<M>(), IdentityDirections::for_model::<M, T, F>());

@@ -5,11 +5,12 @@
 //! ```
 //!
 //! The [`sweep`] takes a step panel by panel: the [right-hand side](right_hand_side), the solution,
-//! its [sums](checksum) over all directions, [rows of `D`](stage_rows) for second derivatives, the
-//! [output](output) to [matrices] of results, which have the [gradient](gradient) in them. More is
-//! [written](write) after the step where it is asked for. Derivatives whose equations have lost
-//! digits are [refined](refine); the [dense fallback](dense_fallback) solves column by column.
-//! [`memory`] is what a call keeps, in all directions or in [given ones](directional).
+//! its [checksums](checksum) over all directions, [rows of `D`](stage_sensitivities) for second
+//! derivatives, and the [output](output) to the [matrices] of results, from which the
+//! [gradient](gradient) is computed. Further outputs of a step are [written](write_outputs) on
+//! demand. Derivatives that lost digits are [refined](refine); the [dense fallback](dense_fallback)
+//! solves column by column. [`memory`] holds a call in all directions, [`directional`] in given
+//! ones.
 
 pub(super) mod checksum;
 mod dense_fallback;

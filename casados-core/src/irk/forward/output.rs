@@ -1,14 +1,14 @@
-//! What derivatives over a step are written to: matrices of results, and rows of `D` at a stage.
+//! The outputs of derivatives over a step: matrices of results, and rows of `D` at a stage.
 
 use crate::linalg::{Arithmetic, PanelRow};
 use crate::scalar::Lanes;
 use core::ops::Range;
 
-/// Where derivatives are written.
+/// The destination of derivatives.
 pub(crate) trait DerivativeOutput<E> {
-    /// The columns of a matrix that belong to columns of the panels, from this one on.
+    /// The columns of a matrix for the panel that begins with `column`.
     fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [E]; W];
-    /// Where the columns behind these are, if it is known.
+    /// The memory of the columns after these, if it is known.
     fn next_columns<const W: usize>(&self, _column: usize) -> &[E] {
         &[]
     }
@@ -16,23 +16,23 @@ pub(crate) trait DerivativeOutput<E> {
 
 /// `V + Σ_i weight_i dy_i` of a panel.
 pub(in crate::irk) struct PanelCombination<'a, E, const S: usize, const W: usize> {
-    /// What is added to. Nothing stands for zero, or for the unit matrix.
+    /// The matrix `V`. `None` stands for zero, or for the unit matrix.
     pub base: Option<&'a [[E; W]]>,
-    /// In which row each column of the unit matrix has its one; empty without one.
+    /// The row of the one in each column of the unit matrix; empty without unit matrix.
     pub unit_rows: &'a [u32],
     /// The derivatives of the stages.
     pub dy: &'a [PanelRow<E, S, W>],
-    /// The unknown of each row.
+    /// The range of unknowns of the rows.
     pub unknowns: Range<usize>,
     /// `−weight_i`
     pub minus_weights: &'a [E; S],
 }
 
-/// So many rows are computed before they are written, each number to its column.
+/// Number of rows that are computed before they are written column by column.
 const ROWS_PER_BLOCK: usize = 4;
 
 impl<E: Lanes, const S: usize, const W: usize> PanelCombination<'_, E, S, W> {
-    /// Writes its columns; their sum, which is finite only if all of them are.
+    /// Writes the columns; returns their sum, which is finite only if all elements are.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn write<A: Arithmetic>(&self, to: &mut [&mut [E]; W]) -> E {
         let mut sums = [E::from_f64(0.0); W];
@@ -61,7 +61,7 @@ impl<E: Lanes, const S: usize, const W: usize> PanelCombination<'_, E, S, W> {
         sum
     }
 
-    /// Some rows.
+    /// Writes `R` rows.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn write_rows<A: Arithmetic, const R: usize>(
         &self,
@@ -80,7 +80,7 @@ impl<E: Lanes, const S: usize, const W: usize> PanelCombination<'_, E, S, W> {
                 *sum = *sum + element;
             }
         }
-        // Of numbers that are not registers themselves four by four are exchanged in registers.
+        // Squares of four by four scalars are transposed in registers.
         let square_blocks =
             if const { size_of::<E>() <= 8 && R == ROWS_PER_BLOCK } { W / ROWS_PER_BLOCK } else { 0 };
         for square in 0..square_blocks {

@@ -1,17 +1,16 @@
-//! Forward derivatives to the digits that the equations determine, not only those of the assembled
-//! Jacobian.
+//! Iterative refinement of forward derivatives, with residuals by tangents of the model.
 //!
-//! An entry of the Jacobian is a sum that rounds away what is small in it. Where the sum of several
-//! equations is slow while each is fast, as with the mass of a chemical reaction over a long step,
-//! what is small is all there is of the slow motion. A tangent of the model has no such sums: terms
-//! that equations share are rounded once, and cancel. So
+//! An entry of the Jacobian is a sum that rounds away its small terms. If a combination of several
+//! equations is slow while each equation is fast (the mass balance of a chemical reaction over a
+//! long step), the slow motion consists of these small terms. In a tangent of the model, terms that
+//! equations share are rounded once and cancel. So
 //!
 //! ```text
 //! r_i = f_ẋ dk_i + f_x (V_n + h Σ_j a_ij dk_j) + f_z dz_i + f_w
 //! ```
 //!
-//! is computed by tangents, and corrected with the factors that are there (iterative refinement; C.
-//! B. Moler, J. ACM 14, 1967). One sum of all directions tells whether that is worth it.
+//! is computed by tangents, and corrected with the available factors (C. B. Moler, J. ACM 14,
+//! 1967). The checksum over all directions decides whether a refinement is worthwhile.
 
 use super::checksum::sum_accumulators;
 use super::dense_fallback::write_column;
@@ -28,15 +27,15 @@ use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// A correction below this many ε of its unknown is none.
+/// Corrections below this, in ε relative to the unknown, are not applied.
 const CORRECTION_TOLERANCE: f64 = 4096.0;
 
-/// So often derivatives are refined.
+/// Maximal number of refinements.
 const MAX_REFINEMENTS: usize = 3;
 
 impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
-    /// After a step whose derivatives satisfy their equations as the Jacobian has them: mends them,
-    /// and what follows from them, where those of the model are others.
+    /// After a step whose derivatives satisfy the equations of the assembled Jacobian: corrects
+    /// them, and the outputs that depend on them, if the tangents of the model differ.
     pub(in crate::irk) fn refine<D: Directions<T>, G: DerivativeOutput<T>, F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, T, S, F>,
@@ -47,14 +46,14 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
         let mut last_correction = f64::INFINITY;
         for _ in 0..MAX_REFINEMENTS {
             let correction = self.largest_correction(work, coefficients);
-            // Also if it is not a number: then there is nothing to be refined with.
+            // The negated comparison also ends the refinement if the correction is not a number.
             if !(correction > CORRECTION_TOLERANCE * T::EPSILON && correction < 0.5 * last_correction) {
                 return;
             }
             last_correction = correction;
             self.refine_columns(work, coefficients, directions);
             self.update_outputs(work, linearized, outputs);
-            // Each correction is that part of the one before.
+            // The next correction is about the square of this one.
             if correction * correction <= CORRECTION_TOLERANCE * T::EPSILON {
                 return;
             }
@@ -62,8 +61,8 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
         }
     }
 
-    /// The largest correction of the sum of all directions, relative to each unknown; of a slope
-    /// also to what it changes, `V_n / h`. The sum is where it was tried on the equations.
+    /// Returns the largest correction of the checksum, relative to each unknown; for a slope also
+    /// relative to `V_n / h`. The checksum is the one that was checked in `backward_error`.
     fn largest_correction<F: Fallback>(
         &self,
         work: &mut StageWorkspace<M, T, S, F>,
@@ -96,7 +95,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
         largest
     }
 
-    /// One correction of every direction.
+    /// Corrects every direction once.
     fn refine_columns<D: Directions<T>, F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, T, S, F>,
@@ -136,7 +135,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
     }
 }
 
-/// `x ← x − Δ`. Seldom needed: a loop of its own is not unrolled.
+/// `x ← x − Δ`, as a function that is executed rarely: its loop is not unrolled.
 #[cfg_attr(feature = "std", inline(never))]
 fn subtract_corrections<T: Real>(x: &mut [T], corrections: &[T]) {
     for (x, correction) in x.iter_mut().zip(corrections) {
@@ -177,10 +176,11 @@ impl<M: Dae, T: Real, const S: usize, const W: usize> Kernel for ColumnDirection
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// The tangent of the residual at all stages in the direction of the probe, beside it.
+    /// Computes the tangent of the residual at all stages in the direction of the first array of
+    /// `variable_scratch`, and stores it in the second.
     fn evaluate_tangent(&mut self) {
         let Self { points, variable_scratch: [directions, tangent], .. } = self;
-        // There are no derivatives by the time.
+        // Time is not a direction.
         if let Some(time) = directions.as_mut().last_mut() {
             *time = [T::ZERO; S];
         }
@@ -215,7 +215,7 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for StageTangents<'_, M,
     }
 }
 
-/// The same, compiled for the register.
+/// [`StageTangents`], compiled for a SIMD register.
 struct RegisterTangents<'a, M: Dae, E: Lanes, R, const S: usize> {
     stages: StageTangents<'a, M, E, S>,
     register: PhantomData<R>,

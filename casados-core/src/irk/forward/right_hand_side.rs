@@ -12,8 +12,8 @@ use crate::model::Dependent;
 use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, each};
 
-/// Right-hand sides where every direction is an element of `w` and `V_n` the unit matrix: entries
-/// of the Jacobian go to their places in all panels.
+/// Right-hand sides if every direction is an element of `w` and `V_n` the unit matrix: scatters the
+/// entries of the Jacobian to all panels.
 pub(in crate::irk) struct Scatter<'a, M, E, D, const S: usize> {
     pub plan: M,
     pub jacobian: &'a [[E; S]],
@@ -23,7 +23,7 @@ pub(in crate::irk) struct Scatter<'a, M, E, D, const S: usize> {
 }
 
 impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
-    /// Places all of them.
+    /// Scatters all entries.
     #[inline(always)]
     pub fn evaluate<A: Arithmetic>(&mut self) {
         for_each_row::<A, _>(self);
@@ -65,7 +65,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor for Scatter
     }
 }
 
-/// The entries by which other equations depend on kinematic states.
+/// Scatters the entries by which other equations depend on kinematic states.
 struct ScatterDependents<'a, 'b, M, E, D, const S: usize>(&'a mut Scatter<'b, M, E, D, S>);
 
 impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor
@@ -90,8 +90,8 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor
     }
 }
 
-/// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`,
-/// with its slot and the variable.
+/// Returns the entry of the velocity that results from eliminating a kinematic state, `c f_q̇,i` or
+/// `h c_i c f_q,i`, with its slot and its variable.
 #[inline(always)]
 fn eliminated_entry<M: Plan, E: Lanes, const S: usize>(
     plan: M,
@@ -109,23 +109,23 @@ fn eliminated_entry<M: Plan, E: Lanes, const S: usize>(
     Some((slot, kinematic.velocity as usize, products))
 }
 
-/// An entry of the Jacobian, by columns.
+/// Returns an entry of the Jacobian in column order.
 #[inline(always)]
 fn entry_by_column<M: Plan, V>(plan: M, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
     plan.entry(jacobian, *plan.structure().by_column.get(index)? as usize)
 }
 
-/// Entries of the Jacobian that are in their panels.
+/// Numbers of entries that are already in their panels.
 #[derive(Clone, Copy, Default)]
 pub(in crate::irk) struct ScatterProgress {
-    /// Column by column.
+    /// Entries of the Jacobian in column order.
     entries: usize,
-    /// Those by which equations depend on kinematic states.
+    /// Entries by which equations depend on kinematic states.
     dependents: usize,
 }
 
-/// The same of a panel that begins with a column: entries column by column, those that follow the
-/// ones of the panel before.
+/// Scatters to the panel that begins with a column: entries in column order, from the end of the
+/// preceding panel on.
 #[inline(always)]
 pub(in crate::irk) fn scatter_panel<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     (plan, directions): (M, D),
@@ -180,7 +180,7 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
     }
 }
 
-/// The direction that a variable other than `ẋ` is, if it is one.
+/// The column of a variable other than `ẋ`, if it is a direction.
 #[inline(always)]
 fn direction_column<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variable: usize) -> Option<usize> {
     let (nx, nz) = (plan.nx(), plan.nz());
@@ -190,7 +190,7 @@ fn direction_column<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variab
     directions.column(if variable < 2 * nx { variable - nx } else { variable - nx - nz })
 }
 
-/// The same of a panel, whatever `V_n` is.
+/// The right-hand side of a panel for general `V_n`.
 pub(in crate::irk) struct PanelRightHandSide<'a, M, E, D, const S: usize, const W: usize> {
     pub kinematic: KinematicPanel<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
@@ -200,8 +200,8 @@ pub(in crate::irk) struct PanelRightHandSide<'a, M, E, D, const S: usize, const 
 impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
     PanelRightHandSide<'_, M, E, D, S, W>
 {
-    /// Whether an unrolled loop begins with zeros everywhere: of plain numbers that is less than a
-    /// row that begins with its first entry.
+    /// Whether an unrolled loop clears all rows first: cheaper for scalars than code for the first
+    /// entry of each row.
     const CLEARS_FIRST: bool = size_of::<E>() <= 8;
 
     #[inline(always)]
@@ -224,7 +224,8 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         for_each_row::<A, _>(&mut InputEntries { plan, jacobian, directions, dy: &mut *self.dy, column });
     }
 
-    /// Each row in registers, and written once; zeros where equations have no states.
+    /// Accumulates each row in registers and writes it once; rows of equations without states are
+    /// zero.
     #[inline(always)]
     fn row_by_row<A: Arithmetic>(&mut self) {
         let (mut panel_row, mut last) = ([[E::from_f64(0.0); W]; S], 0);
@@ -242,7 +243,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         self.clear_rows(last + 1, plan.nk());
     }
 
-    /// `panel_row − f_x,i V`, of one state.
+    /// `panel_row − f_x,i V` for one state.
     #[inline(always)]
     fn subtract_state<A: Arithmetic>(
         &self,
@@ -259,7 +260,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], v); });
     }
 
-    /// The equation that follows that of the entry before this one.
+    /// The equation after that of the preceding entry.
     #[inline(always)]
     fn next_equation(&self, row: usize) -> usize {
         let structure = self.kinematic.plan.structure();
@@ -269,14 +270,14 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         }
     }
 
-    /// The equation that follows that of the last entry, where kernels are compiled for one model.
+    /// The equation after that of the last entry, for kernels that are compiled for one model.
     const fn equation_after_last() -> usize {
         let Some(structure) = M::KNOWN_STRUCTURE else { return 0 };
         let [_, begin, end, ..] = structure.blocks;
         if begin == end { 0 } else { structure.jacobian.at(end - 1).0 + 1 }
     }
 
-    /// The row of an equation.
+    /// Writes the row of an equation.
     #[inline(always)]
     fn write_row(&mut self, equation: usize, panel_row: &PanelRow<E, S, W>) {
         let slot = self.kinematic.plan.slot(equation);
@@ -288,7 +289,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         }
     }
 
-    /// Equations without states.
+    /// Clears the rows of equations without states.
     #[inline(always)]
     fn clear_rows(&mut self, begin: usize, end: usize) {
         for equation in begin..end {
@@ -312,7 +313,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVis
         let Some((r, c, values)) = plan.entry(self.kinematic.jacobian, first + row) else { return };
         let slot = plan.slot(r);
         let next = self.next_equation(row);
-        // The first entry of an equation has nothing to add to.
+        // The first entry of an equation starts the sum.
         let mut panel_row = [[E::from_f64(0.0); W]; S];
         if Self::CLEARS_FIRST || r < next {
             panel_row = *self.dy.get(slot).unwrap_or(&panel_row);
@@ -329,7 +330,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVis
     }
 }
 
-/// `−f_w,i` of a panel, of controls and parameters.
+/// `−f_w,i` of controls and parameters, for a panel.
 struct InputEntries<'a, M, E, D, const S: usize, const W: usize> {
     plan: M,
     jacobian: &'a [[E; S]],

@@ -1,4 +1,4 @@
-//! The derivatives of slopes, for steps of variable size.
+//! The derivatives of slopes, for adaptive integrators.
 
 use super::memory::ForwardPass;
 use super::output::DerivativeOutput;
@@ -10,7 +10,7 @@ use crate::shape::Plain;
 use core::mem::take;
 
 impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
-    /// The derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    /// Writes the derivatives of `Σ_i weight_i k_i` of the last step, one row per direction.
     pub(crate) fn slope_derivatives(&self, weights: &[T; S], to: &mut ArrayW<M, ArrayX<M, T>>) {
         for direction in to.as_mut() {
             direction.as_mut().fill(T::ZERO);
@@ -20,7 +20,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
     }
 }
 
-/// A row for each direction.
+/// A matrix with one row per direction.
 struct DirectionRows<'a, M: Dae, T: Plain> {
     rows: &'a mut ArrayW<M, ArrayX<M, T>>,
 }

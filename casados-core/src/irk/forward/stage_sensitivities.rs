@@ -1,19 +1,20 @@
-//! The rows of `D` that enter second derivatives: of curved variables at all stages, from the
-//! derivatives of a step.
+//! The rows of `D` that enter second derivatives: those of nonlinear variables at all stages.
 
 use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel_width, static_columns};
 use crate::linalg::{Arithmetic, Block, PanelRow};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
-/// Whether all stages of a variable lie together: unless a panel is too large for the nearest
-/// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
+/// Whether the stages of a variable are adjacent in a panel of `D`. They are not if a panel exceeds
+/// the L1 cache, or if numbers are SIMD registers, there are only sixteen of them, and more than
+/// two stages.
 const fn are_stages_adjacent<E, const S: usize>(curved: usize, columns: usize) -> bool {
     let panel = curved * S * panel_width::<E>(S, columns) * size_of::<E>();
     panel <= L1_CACHE_BYTES / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
 }
 
-/// The same of a plan. Where kernels are not compiled for one model, variables of a stage do.
+/// Whether the stages of a variable are adjacent for a plan. If the plan is known at run time only,
+/// the variables of a stage are adjacent.
 pub(in crate::irk) const fn stages_adjacent<P: Plan, E, const S: usize>() -> bool {
     match (P::KNOWN_STRUCTURE, static_columns::<P, E>()) {
         (Some(structure), Some(columns)) => are_stages_adjacent::<E, S>(structure.curved.len(), columns),
@@ -21,30 +22,30 @@ pub(in crate::irk) const fn stages_adjacent<P: Plan, E, const S: usize>() -> boo
     }
 }
 
-/// Where rows of curved variables lie in a panel of `D`.
+/// The order of the rows of nonlinear variables in a panel of `D`.
 #[derive(Clone, Copy)]
 pub(in crate::irk) struct StageRowLayout {
     nonlinear_count: usize,
-    /// Whether all stages of a variable lie together.
+    /// Whether the stages of a variable are adjacent.
     stages_adjacent: bool,
 }
 
 impl StageRowLayout {
-    /// Those of a plan.
+    /// The layout for a plan.
     #[inline(always)]
     pub fn for_plan<P: Plan, E, const S: usize>(plan: P) -> Self {
         let curved = plan.structure().curved.len();
         Self { nonlinear_count: curved, stages_adjacent: const { stages_adjacent::<P, E, S>() } }
     }
 
-    /// The row of a curved variable at a stage.
+    /// The row of a nonlinear variable at a stage.
     #[inline(always)]
     pub fn row_index<const S: usize>(self, variable: usize, stage: usize) -> usize {
         if self.stages_adjacent { variable * S + stage } else { stage * self.nonlinear_count + variable }
     }
 }
 
-/// What they are made by.
+/// Writes the rows of `D`.
 pub(in crate::irk) struct StageRowWriter<P, E, D, const S: usize> {
     pub plan: P,
     /// `−hA`
@@ -53,7 +54,7 @@ pub(in crate::irk) struct StageRowWriter<P, E, D, const S: usize> {
 }
 
 impl<P: Plan, E: Lanes, D: Directions<E>, const S: usize> StageRowWriter<P, E, D, S> {
-    /// Those of a panel, from the derivatives of its stages.
+    /// Writes the rows of a panel from the derivatives of its stages.
     #[inline(always)]
     pub fn write_panel<A: Arithmetic, const W: usize>(
         &self,

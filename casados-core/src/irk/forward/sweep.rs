@@ -1,5 +1,5 @@
-//! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to
-//! `V_{n+1}`, which after the last step is a result, and to what second derivatives need of both.
+//! A step of the forward sweep, panel by panel: from `V_n` to the stage derivatives, to `V_{n+1}`
+//! (the result, after the last step), and to the rows of `D` for second derivatives.
 
 use super::checksum::{ACCUMULATORS, ChecksumVisitor, accumulate, clear_accumulators, minus_weights};
 use super::output::{DerivativeOutput, PanelCombination};
@@ -22,62 +22,63 @@ use crate::shape::{Aligned, Array, Plain, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
+/// Derivatives of one step, in panels; `R` holds one number per direction.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct ForwardSweep<M: Dae, T: Plain, R: Plain, const S: usize> {
-    /// `dx_n/dw` at the start of the step, and at its end if that is not the end of the interval.
+    /// `V_n = dx_n/dw` at the start of the step, and `V_{n+1}` at its end unless the interval ends
+    /// there.
     v: [Aligned<ArrayX<M, R>>; 2],
-    /// Which of them is at the end.
+    /// Whether the first of them is at the end of the step.
     end_is_first: bool,
-    /// The first of them is what it is at the start of an interval, where that is always the same.
+    /// Whether the first of them holds the unit matrix of the start of an interval.
     identity_written: bool,
-    /// `d(k, z)/dw` at its stages.
+    /// `d(k, z)/dw` at the stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in accumulators.
     pub(in crate::irk) stage_sums: Aligned<ArrayK<M, [[T; ACCUMULATORS]; S]>>,
     pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; ACCUMULATORS]>>,
-    /// Zero if all that was written to a result after the last step is finite, else NaN.
+    /// Zero if all derivatives in the result are finite, otherwise NaN.
     pub(in crate::irk) finite_indicator: [T; 1],
 }
 
-/// A step that is linearised, and the directions that go through it.
+/// A linearised step and its directions.
 pub(in crate::irk) struct LinearizedStep<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
-    /// Where its factors are, if they are not where they are made.
+    /// The linearisation with the factors; `None` if they are in the workspace.
     pub stored_linearization: Option<&'a Linearization<M, E, S, F>>,
     pub coefficients: &'a Coefficients<E, S>,
     pub directions: D,
-    /// Whether it is the first of the interval.
+    /// Whether the step is the first of the interval.
     pub is_first: bool,
 }
 copy!(['a, M: Dae, E: Lanes, D: Copy, const S: usize, F: Fallback] LinearizedStep<'a, M, E, D, S, F>);
 
-/// What a step writes beside its own memory.
+/// The outputs of a step besides its own memory.
 pub(in crate::irk) struct StepOutputs<'a, E, G> {
     /// The rows of `D` for second derivatives.
     pub stage_sensitivities: Option<&'a mut [E]>,
-    /// The result, after the last step: it has `V_{n+1}`.
+    /// The result of the last step, which receives `V_{n+1}`.
     pub result: Option<G>,
-    /// Whether that may be in no cache.
+    /// Whether the memory of the result may be in no cache.
     pub prefetch_output: bool,
 }
 
-/// What is done to a panel.
+/// The part of the work on a panel.
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::irk) enum SweepPart {
-    /// All of it.
+    /// The right-hand side, the solution, and the outputs.
     All,
-    /// The right-hand side.
+    /// The right-hand side only.
     RightHandSide,
-    /// What comes after the solution.
+    /// The outputs after the solution.
     AfterSolve,
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
-    /// `V_0`
+    /// Sets `V_0`.
     pub(crate) fn set_initial_directions<D: Directions<E>>(&mut self, directions: D) {
         self.end_is_first = false;
-        // Without an operating system every call takes the same time, the first one too.
+        // Without an operating system all calls take the same time, including the first one.
         if !(cfg!(feature = "std") && D::ARE_UNIT_VECTORS && self.identity_written) {
             let end = R::flat_mut(self.v[0].as_mut());
             unit_or_seeds::<E, D, S>(end, M::Shape::NX, directions);
@@ -85,8 +86,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         self.identity_written = D::ARE_UNIT_VECTORS;
     }
 
-    /// The step that follows, which is linearised. Whether the derivatives of the stages satisfy
-    /// their equations.
+    /// Differentiates the next step, which is linearised. Returns the lanes in which the stage
+    /// derivatives satisfy their equations.
     pub(in crate::irk) fn step<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -97,7 +98,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         self.repeat_step(work, linearized, outputs)
     }
 
-    /// The same step again.
+    /// Repeats the step.
     pub(in crate::irk) fn repeat_step<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -160,8 +161,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         })];
     }
 
-    /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums
-    /// over all directions.
+    /// Recomputes the outputs after a change of the stage derivatives: `V_{n+1}` and the checksums.
     pub(in crate::irk) fn update_outputs<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
         work: &StageWorkspace<M, E, S, F>,
@@ -171,7 +171,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         self.run(work, linearized, outputs, SweepPart::AfterSolve, false);
     }
 
-    /// `V` at the start of the step.
+    /// `V_n` at the start of the step.
     pub(in crate::irk) fn v(&self) -> &[E] {
         self.v.get(usize::from(!self.end_is_first)).map_or(&[], |v| R::flat(v.as_ref()))
     }
@@ -188,7 +188,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
 }
 
 kernels! {
-    /// See [`Sweep::start`].
+    /// See [`ForwardSweep::set_initial_directions`].
     fn unit_or_seeds [E: Lanes, D: Directions<E>, const S: usize] [E, D, S] <A>(
         v: &'k mut [E],
         rows: usize,
@@ -203,7 +203,7 @@ kernels! {
     }
 }
 
-/// See [`Sweep::step`].
+/// See [`ForwardSweep::step`].
 struct SweepKernel<'a, M: Plan, E: Plain, D, G, F, const S: usize> {
     plan: M,
     part: SweepPart,
@@ -221,14 +221,14 @@ struct SweepKernel<'a, M: Plan, E: Plain, D, G, F, const S: usize> {
     stage_sensitivities: Option<&'a mut [E]>,
     result: Option<&'a mut G>,
     prefetch_output: bool,
-    /// That of all that was written to the result.
+    /// The sum of all elements that were written to the result.
     output_sum: E,
     with_second_weights: bool,
     scatter_progress: ScatterProgress,
     fallback: PhantomData<F>,
 }
 
-/// What all panels share.
+/// The coefficients of all panels.
 struct PanelCoefficients<E, const S: usize> {
     /// `h c_i`
     nodes: [E; S],
@@ -274,7 +274,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         let shared = &PanelCoefficients { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
         let columns = self.directions.columns();
         panels!([D::COLUMNS, columns], E, S, column, W => self.process_panel::<A, W>(column, shared));
-        // Nothing times what is not finite is not a number.
+        // Zero times a non-finite number is NaN.
         E::from_f64(0.0) * self.output_sum
     }
 }
@@ -285,8 +285,8 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
     /// Whether `V_n` is always the unit matrix.
     const ALWAYS_IDENTITY: bool = D::ARE_UNIT_VECTORS && !F::INTERVALS;
 
-    /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
-    /// each is filled when its turn comes.
+    /// Whether all panels fit the L1 cache and one unrolled loop fills them; the panels of a large
+    /// model are filled one at a time.
     const fn fits_cache<A: Arithmetic>() -> bool {
         let (Some(columns), Some(nk)) = (D::COLUMNS, StructureTable::Unknowns.known_row_count::<M>()) else {
             return false;
@@ -295,8 +295,8 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         bytes <= L1_CACHE_BYTES && is_unrolled::<A, Scatter<'_, M, E, D, S>>()
     }
 
-    /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
-    /// cache, and registers are few.
+    /// Whether the checksums are computed from memory after the solution: small models fit the L1
+    /// cache, and scalar registers are few.
     const fn sums_after_solve<A: Arithmetic>() -> bool {
         size_of::<E>() <= 8 && Self::fits_cache::<A>()
     }
@@ -336,13 +336,13 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         self.process_solution::<A, W>(column, minus_weights, shared);
     }
 
-    /// The right-hand side of a panel, with `h c_i`.
+    /// Computes the right-hand side of a panel, with the nodes `h c_i`.
     #[inline(always)]
     fn compute_right_hand_side<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
         let (plan, nx, nk) = (self.plan, self.plan.nx(), self.plan.nk());
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
-        // Lengths that the optimiser knows need no looking at.
+        // Equal lengths, so that the optimiser removes bounds checks.
         if self.part == SweepPart::AfterSolve || v.len() != nx || dy.len() != nk {
             return;
         }
@@ -362,7 +362,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         }
     }
 
-    /// What follows from the solution of a panel.
+    /// Computes the outputs of a panel from its solution.
     #[inline(always)]
     fn process_solution<A: Arithmetic, const W: usize>(
         &mut self,
@@ -391,7 +391,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
                 accumulate::<A, E, W>(accumulators, minus_weights, row);
             }
         }
-        // The unit matrix need not be read.
+        // The unit matrix is known: it is not read.
         let base = if is_identity { None } else { Some(v) };
         let ones =
             if is_identity { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };

@@ -1,4 +1,4 @@
-//! What a sweep writes after a step: derivatives at a point of it, and rows of `D` at a stage.
+//! Further outputs of a step: derivatives at a point of it, and rows of `D` at a stage.
 
 use super::output::{DerivativeOutput, PanelCombination};
 use super::sweep::ForwardSweep;
@@ -12,8 +12,8 @@ use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
-    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are
-    /// `weights`. All of these say zero if all that is written is finite, else NaN.
+    /// Writes the derivatives of `x` at a point of the step with the `weights` `h b_i(θ)`. This and
+    /// the following functions return zero if everything they write is finite, otherwise NaN.
     pub(crate) fn write_differential<P: Plan, D: Directions<E>>(
         &self,
         of: (P, D),
@@ -23,8 +23,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         self.write_combination::<P, D, _, false>(of, Some(self.v()), weights, to)
     }
 
-    /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are
-    /// `lagrange`.
+    /// Writes the derivatives of `z` at a point of the step with the values `lagrange` of the
+    /// Lagrange polynomials.
     pub(crate) fn write_algebraic<P: Plan, D: Directions<E>>(
         &self,
         of: (P, D),
@@ -45,7 +45,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
         self.write_combination::<P, D, _, false>(of, None, weights, to)
     }
 
-    /// Writes `V + Σ_i weight_i dy_i`, of the states or of the algebraic ones.
+    /// Writes `V + Σ_i weight_i dy_i` of the states or of the algebraic states.
     fn write_combination<P: Plan, D: Directions<E>, G: DerivativeOutput<E>, const ALGEBRAIC: bool>(
         &self,
         (plan, directions): (P, D),
@@ -68,7 +68,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardSweep<M, E, ArrayC<M, E>, S> {
-    /// Rows of `D` at a stage for some variables, over all directions.
+    /// Writes the rows of `D` at a stage for some variables, over all directions.
     pub(crate) fn write_stage_rows<F: Fallback>(
         &self,
         coefficients: &Coefficients<E, S>,
@@ -84,10 +84,10 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardSweep<M, E, ArrayC<M, E>, S> {
     }
 }
 
-/// See [`Sweep::write_rows`].
+/// See [`ForwardSweep::write_stage_rows`].
 struct WriteStageRows<'a, M, E: Lanes, const S: usize> {
     plan: M,
-    /// Of all directions.
+    /// Number of columns of all directions.
     columns: usize,
     v: &'a [E],
     dy: &'a [E],
@@ -95,7 +95,7 @@ struct WriteStageRows<'a, M, E: Lanes, const S: usize> {
     h: E,
     stage: usize,
     variables: &'a [u32],
-    /// A row for each variable.
+    /// One row per variable.
     d: &'a mut [E],
 }
 
@@ -111,7 +111,8 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
             let variable = variable as usize;
             let Some(row) = d.get_mut(variable * nw..(variable + 1) * nw) else { continue };
             row.fill(zero);
-            // A state or an input on which the model does not depend moves with itself.
+            // A state or an input without influence on the model has the derivative one with
+            // respect to itself.
             let own_direction = if variable < nx {
                 None
             } else if variable < 2 * nx {
@@ -155,7 +156,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
     }
 }
 
-/// `V + Σ_i weight_i dy_i`, panels to matrices.
+/// `V + Σ_i weight_i dy_i`, from panels to matrices.
 struct WriteCombination<'a, P, E, D, G, const S: usize, const ALGEBRAIC: bool> {
     plan: P,
     directions: D,
@@ -187,7 +188,7 @@ impl<P: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, const S: usize
             let columns = PanelCombination { base: v, unit_rows: &[], dy, unknowns, minus_weights: &minus_weights };
             sum = sum + columns.write::<A>(&mut to.columns_mut::<W>(column));
         });
-        // Nothing times what is not finite is not a number.
+        // Zero times a non-finite number is NaN.
         E::from_f64(0.0) * sum
     }
 }

@@ -1,12 +1,12 @@
-//! Second-order sensitivities: symmetric, in one pass over the steps that the adjoint takes.
+//! Second-order sensitivities: symmetric, in the backward sweep of the adjoint.
 //!
 //! ```text
 //! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
 //! ```
 //!
-//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of
-//! `products`. With weights `ν` of `z₀`, which is a sum of unknowns, it is
-//! `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; `products` computes the products.
+//! Weights `ν` of `z₀`, a sum of unknowns, enter `μ` only; the result is then
+//! `d²(λᵀ x_N + νᵀ z₀)/dw²`.
 
 use super::diagonal::DiagonalUpdate;
 use super::matrix_adjoint::{MatrixAdjoint, is_cheaper};
@@ -37,14 +37,14 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) pass: HessianPass<M, T, S>,
 }
 
-/// A pass over the steps, from the last to the first, which writes to a result elsewhere.
+/// A backward pass over the steps that writes to a result of the caller.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     pub(crate) backward: AdjointSweep<M, T, S, 1>,
-    /// `−H D` of a few columns at all stages.
+    /// `−H D` of `G_COLUMNS` columns at all stages.
     g: Aligned<ArrayV<M, [[T; G_COLUMNS]; S]>>,
-    /// The Hessian over the directions that have any influence, its lower triangle.
+    /// The lower triangle of the Hessian over the directions with influence.
     sum: ArrayW<M, ArrayC<M, T>>,
     /// `μ` at all stages, in the order of the equations.
     mu: Aligned<StageArray<ArrayK<M, [T; S]>, T, S>>,
@@ -52,48 +52,49 @@ pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     entries: Aligned<StageArray<M::Hessian<[T; S]>, T, S>>,
 }
 
-/// What the way back needs of a step.
+/// The tape entry of a step for the backward pass.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     linear: Linearization<M, T, S, F>,
-    /// The rows of `D` at all stages that enter second derivatives, in panels.
+    /// The rows of `D` of nonlinear variables at all stages, in panels.
     d: Aligned<ArrayV<M, [ArrayC<M, T>; S]>>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
-    /// Whether the factors of every step are made where they will be kept: no other step has the
-    /// same ones, nor does Newton's method leave those of the solution.
+    /// Whether the factors of every step are computed in its tape entry: each step has different
+    /// factors, and Newton's method does not leave those at the solution.
     #[cfg(feature = "alloc")]
     pub(crate) const FACTORS_ON_TAPE: bool = {
         let structure = &M::STRUCTURE;
         !(structure.linear_in_state || structure.constant_matrix || !structure.elimination.has_plan())
     };
 
-    /// Where the way forth writes `D`.
+    /// The memory that the forward pass writes `D` to.
     pub(crate) fn stage_sensitivities_mut(&mut self) -> &mut [E] {
         self.linearization_and_rows().1
     }
 
-    /// The linearisation, and where the way forth writes `D`.
+    /// The linearisation, and the memory that the forward pass writes `D` to.
     pub(crate) fn linearization_and_rows(&mut self) -> (&mut Linearization<M, E, S, F>, &mut [E]) {
         (&mut self.linear, Array::flat_mut(self.d.as_mut().as_flattened_mut()))
     }
 
-    /// Remembers the linearisation on the way forth.
+    /// Stores the linearisation during the forward pass.
     pub(crate) fn store_linearization(&mut self, work: &StageWorkspace<M, E, S, F>) {
         self.linear.copy_from(&work.linearization);
     }
 
-    /// What was remembered, if the step is not the `last` one, whose linearisation is still where
-    /// it was made.
+    /// The stored linearisation; `None` for the last step, whose linearisation is still in the
+    /// workspace.
     pub(crate) fn stored_linearization(&self, is_last: bool) -> Option<&Linearization<M, E, S, F>> {
         (!is_last).then_some(&self.linear)
     }
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
-    /// The way back, with `λ` and `ν`; the linearisation of the last step is still there.
+    /// Runs the backward pass with `λ` and `ν`; the linearisation of the last step is in the
+    /// workspace.
     ///
     /// # Errors
     /// A second derivative of the model that is not finite, a singular matrix.
@@ -127,12 +128,12 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
-    /// Before the last step, with `λ` and `ν`; the latter may be empty.
+    /// Sets `λ` and `ν` before the last step; `nu` may be empty.
     pub(crate) fn set_seeds(&mut self, lambda: &[E], nu: &[E]) {
         self.backward.set_seeds(lambda, nu);
     }
 
-    /// `∇²(μ_iᵀ f)` at all stages of a step.
+    /// Evaluates `∇²(μ_iᵀ f)` at all stages of a step.
     pub(crate) fn evaluate_hessian_entries<F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -159,9 +160,9 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of
-    /// this one `kept` or there. After the first one the result will be written, which may lie far
-    /// `ahead`.
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step. The linearisation is
+    /// `stored_linearization` or that of the workspace; `prefetch` is the memory of the result,
+    /// which is written after the first step.
     pub(crate) fn subtract_congruence<F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -222,8 +223,8 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for HessianEntries<'_, M
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
-    /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if
-    /// all of these are finite, else NaN.
+    /// Writes the result after the first step, plus the second derivatives of an integrand. Returns
+    /// zero if all of them are finite, otherwise NaN.
     pub(crate) fn write_result<F: Fallback>(
         &mut self,
         integrand_hessian: Option<&[ArrayW<M, E>]>,
@@ -253,7 +254,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
-    /// Writes the result, as [`HessianPass::collect`].
+    /// Writes the result, as [`HessianPass::write_result`].
     ///
     /// # Errors
     /// [`Error::Overflow`]
@@ -265,7 +266,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
         let finite = self.write_result::<F>(integrand_hessian, result).is_finite();
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         check_gradient(grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice())?;
-        // Only where one is not finite it is looked for.
+        // The non-finite value is searched for only if there is one.
         if finite { Ok(()) } else { check_second_derivatives(result) }
     }
 }

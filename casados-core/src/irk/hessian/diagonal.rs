@@ -1,4 +1,4 @@
-//! Second derivatives on the diagonal that need no row of `D`: of a direction itself.
+//! Diagonal second derivatives in a single control or parameter, which need no row of `D`.
 
 use super::products::StridedMatrix;
 use crate::irk::directions::column_of;
@@ -6,7 +6,7 @@ use crate::linalg::{Arithmetic, Kernel};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
-/// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit
+/// Adds second derivatives in a control or a parameter alone: its row of `D_i` is a row of the unit
 /// matrix.
 pub(in crate::irk) struct DiagonalUpdate<'a, M, E, const S: usize> {
     pub plan: M,

@@ -1,16 +1,16 @@
-//! `Σ_n Σ_i D_iᵀ H_i D_i` without products of all directions with each other: the adjoint,
-//! backwards over the steps, of what second derivatives add at their stages, in all directions at
-//! once.
+//! `Σ_n Σ_i D_iᵀ H_i D_i` by a matrix adjoint: the second derivatives at the stages are the source
+//! terms of a backward sweep, in all directions at once. It replaces the products of panels with
+//! panels.
 //!
 //! ```text
 //! Jᵀ M = h (b ⊗ Λ_{n+1}, 0) + Qᵀ G        (Qᵀ G)_k,j = G_ẋ,j + h Σ_i a_ij G_x,i        (Qᵀ G)_z,j = G_z,j
 //! Λ_n = Λ_{n+1} − Σ_i f_x,iᵀ M_i + Σ_i G_x,i        Λ_w += − Σ_i f_w,iᵀ M_i + Σ_i G_w,i
 //! ```
 //!
-//! with `G_i = −H_i D_i`, and `Λ_N = 0`. Since `D` is what the forward sweep makes of unit vectors,
-//! and this the same sweep transposed, `(Λ_0, Λ_w) = −Σ_n Σ_i D_iᵀ H_i D_i`. Products of panels
-//! (`products`) take as many operations as there are curved variables for each pair of directions;
-//! this takes a sparse solve for each direction, which is less where a model is large.
+//! with `G_i = −H_i D_i`, and `Λ_N = 0`. The forward sweep maps unit vectors to `D`; this is its
+//! transpose, so `(Λ_0, Λ_w) = −Σ_n Σ_i D_iᵀ H_i D_i`. Products of panels (`products`) take one
+//! operation per nonlinear variable and pair of directions; the matrix adjoint takes one sparse
+//! solve per direction, which is cheaper for large models.
 
 use super::matrix_adjoint_step::{AdvancePanel, InverseWeights, add_stages, row_chunk};
 use super::products::{G_COLUMNS, StridedMatrix};
@@ -27,50 +27,50 @@ use crate::linalg::{
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
-use crate::plan::{Plan, PlanOf, has_direct_rates};
+use crate::plan::{Plan, PlanOf, has_ordered_derivatives};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 
-/// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products
-/// that panels take, counted for each direction. A solve waits for memory, which products of panels
-/// do not. Only of single numbers: registers of them leave no room for panel rows.
+/// Whether the matrix adjoint is used: for scalars, if it takes less than 4/9 of the operations of
+/// the products of panels, per direction. The factor accounts for the memory traffic of a solve.
+/// SIMD registers leave no room for panel rows.
 pub(in crate::irk) const fn is_cheaper<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if G_COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
         return false;
     }
-    // Each of its products is an operation for the sum, too.
+    // Each product of a solve is one multiplication with one addition.
     let solve = structure.elimination_cost(S as u64).1 as usize / 2;
     let blocks = &structure.blocks;
-    let of_x = if has_direct_rates(structure) { blocks[1] } else { blocks[2] - blocks[1] };
+    let of_x = if has_ordered_derivatives(structure) { blocks[1] } else { blocks[2] - blocks[1] };
     let entries = S * (of_x + blocks[5] - blocks[3]);
     let right = S * (structure.x.len() + S * structure.curved.len());
     let products = structure.curved.len() * S * structure.directions.len() / 2;
     9 * (solve + entries + right) < 4 * products
 }
 
-/// One step backwards, in all directions.
+/// One step of the matrix adjoint, in all directions.
 pub(in crate::irk) struct MatrixAdjoint<'a, M: Dae, E: Plain, const S: usize> {
     pub coefficients: &'a Coefficients<E, S>,
     /// Entries of `∇²(μᵀ f)` at all stages.
     pub entries: &'a [[E; S]],
-    /// The rows of `D` that enter second derivatives.
+    /// The rows of `D` of nonlinear variables.
     pub d: &'a [E],
     /// Memory for `G` and `M` of a panel.
     pub g: &'a mut ArrayV<M, [[E; G_COLUMNS]; S]>,
-    /// `(Λ, Λ_w)`, over the directions that have any influence: a row for each, and a column.
+    /// `(Λ, Λ_w)` over the directions with influence, one row and one column each.
     pub sum: StridedMatrix<'a, E>,
-    /// Whether the step is the first of the interval: of its result nobody needs more than the
-    /// lower triangle.
+    /// Whether the step is the first of the interval: only the lower triangle of its result is
+    /// used.
     pub is_first: bool,
-    /// Whether it is the last one: `Λ_N = 0`.
+    /// Whether the step is the last of the interval: `Λ_N = 0`.
     pub is_last: bool,
-    /// Where the result will be written, if that is far away.
+    /// Prefetch target: the memory of the result.
     pub prefetch: &'a [E],
 }
 
 impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
-    /// Over a step that is linearised, with its factors, which were `kept` or are there.
+    /// Runs one linearised step, with the factors of `stored_linearization` or of the workspace.
     pub fn run<F: Fallback>(
         mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -95,7 +95,7 @@ impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
         }
     }
 
-    /// All panels, or a part of what is done to one of them.
+    /// Runs all panels, or a part of the work on one panel.
     fn run_part<F: Fallback>(
         &mut self,
         linear: &Linearization<M, E, S, F>,
@@ -128,7 +128,7 @@ impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
         });
     }
 
-    /// Solves by the factors of the whole matrix, column by column, of which the panel has so many.
+    /// Solves for the `width` columns of a panel, with the factors of the whole matrix.
     fn solve_columns<F: Fallback>(
         &mut self,
         work: &mut StageWorkspace<M, E, S, F>,
@@ -151,7 +151,7 @@ impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
     }
 }
 
-/// Where `G` and `M` of a panel are.
+/// Splits the memory into `G` and `M` of a panel.
 fn split_g_and_m<M: Dae, E: Plain, const S: usize>(
     g: &mut ArrayV<M, [[E; G_COLUMNS]; S]>,
 ) -> (&mut [E], &mut [E]) {
@@ -162,10 +162,10 @@ fn split_g_and_m<M: Dae, E: Plain, const S: usize>(
 /// See [`MatrixAdjoint`].
 struct PanelKernel<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
-    /// Of all directions.
+    /// Number of columns of all directions.
     columns: usize,
     part: SweepPart,
-    /// The panel that a phase other than all is of.
+    /// The first column of the panel, for parts other than `All`.
     selected_panel: usize,
     jacobian: &'a M::Jacobian<[E; S]>,
     factors: PlannedFactors<'a, M, E, S>,
@@ -181,7 +181,7 @@ struct PanelKernel<'a, M: Plan, E: Plain, const S: usize> {
     is_first: bool,
     is_last: bool,
     prefetch: &'a [E],
-    /// See [`Advance`].
+    /// See [`AdvancePanel`].
     inverse_weights: Option<InverseWeights<E, S>>,
     skipped_entries: usize,
 }
@@ -216,7 +216,7 @@ impl<M: Plan, E: Lanes, const S: usize> PanelKernel<'_, M, E, S> {
         let g = self.g.get_mut(..count * W).unwrap_or_default().as_chunks_mut::<W>().0;
         let m = self.m.get_mut(..nk * S * W).unwrap_or_default();
         let m = m.as_chunks_mut::<W>().0.as_chunks_mut::<S>().0;
-        // Lengths that the optimiser knows need no looking at.
+        // Equal lengths, so that the optimiser removes bounds checks.
         if g.len() != count || m.len() != nk {
             return;
         }
@@ -276,14 +276,14 @@ impl<M: Plan, E: Lanes, const S: usize> PanelKernel<'_, M, E, S> {
     }
 }
 
-/// `h (b ⊗ Λ_{n+1}, 0) + Qᵀ G` of a panel.
+/// Computes `h (b ⊗ Λ_{n+1}, 0) + Qᵀ G` of a panel.
 struct RightHandSide<'a, M, E, const S: usize, const W: usize> {
     plan: M,
     rows: StageRowLayout,
     g: &'a [[E; W]],
     minus_ha: &'a Block<E, S>,
     minus_hb: &'a [E; S],
-    /// `Λ_{n+1}`; nothing where it is zero.
+    /// `Λ_{n+1}`; `None` if it is zero.
     sum: Option<&'a StridedMatrix<'a, E>>,
     column: usize,
 }
@@ -330,7 +330,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> RightHandSide<'_, M, E, 
     }
 }
 
-/// Whether the curved variable in a position is this one.
+/// Whether the nonlinear variable at this position is `variable`.
 #[inline(always)]
 fn is_variable_at<M: Plan>(plan: M, position: usize, variable: usize) -> bool {
     matches!(plan.structure().curved.get(position), Some(&of) if of as usize == variable)

@@ -1,12 +1,11 @@
-//! What comes out of a step of the adjoint in all directions: `Λ_n`, and what it adds to `Λ_w`; see
-//! `matrix_adjoint`.
+//! The end of a step of the matrix adjoint: `Λ_n`, and the update of `Λ_w`; see `matrix_adjoint`.
 //!
 //! ```text
 //! Λ_n = Λ_{n+1} − Σ_i (f_x,iᵀ M_i − G_x,i) = (1 − bᵀ A⁻¹ 1) Λ_{n+1} + Σ_i ω_i (f_ẋ,iᵀ M_i − G_ẋ,i)        ω = (hA)⁻¹ 1
 //! ```
 //!
-//! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
-//! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
+//! The first form reads the entries of `f_x`. The second follows from `Jᵀ M = …`, which already
+//! contains these sums: it reads the entries of `f_ẋ` only, mostly one for each state.
 
 use super::products::StridedMatrix;
 use crate::irk::coefficients::Coefficients;
@@ -22,11 +21,10 @@ pub(in crate::irk) struct InverseWeights<E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> InverseWeights<E, S> {
-    /// No more than this may `Σ |b_i (A⁻¹ 1)_i|` be: so often rounding errors of `Λ` are added.
+    /// Bound of `Σ |b_i (A⁻¹ 1)_i|`, the factor by which rounding errors of `Λ` are multiplied.
     const MAX_GROWTH: f64 = 16.0;
 
-    /// Of a tableau whose `A` has an inverse that is good enough, and steps of a size that has a
-    /// reciprocal: not of length zero.
+    /// Returns the weights if `A` has an accurate inverse and `h` a finite reciprocal.
     pub fn new(coefficients: &Coefficients<E, S>, h: E) -> Option<Self> {
         let ones = solve_ones(*coefficients.tableau.a());
         let (mut keep, mut size, mut minus_weights) = (1.0, 0.0, [E::from_f64(0.0); S]);
@@ -36,12 +34,12 @@ impl<E: Lanes, const S: usize> InverseWeights<E, S> {
             *to = E::from_f64(-one) * h.reciprocal();
         }
         let finite = minus_weights.iter().all(|weight| E::all(weight.is_finite()));
-        // What is not finite is not small either.
+        // The comparison is false for values that are not numbers.
         (finite && size <= Self::MAX_GROWTH).then_some(Self { minus_weights, r_infinity: E::from_f64(keep) })
     }
 }
 
-/// `A⁻¹ 1`, by elimination with pivots of rows; not finite if `A` is singular.
+/// Computes `A⁻¹ 1` by Gaussian elimination with row pivoting; not finite if `A` is singular.
 fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
     let mut x = [1.0; S];
     for k in 0..S {
@@ -68,7 +66,7 @@ fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
     x
 }
 
-/// Of a panel.
+/// Updates the columns of `(Λ, Λ_w)` of a panel.
 pub(in crate::irk) struct AdvancePanel<'a, 'b, M, E, const S: usize, const W: usize> {
     pub plan: M,
     pub rows: StageRowLayout,
@@ -78,12 +76,12 @@ pub(in crate::irk) struct AdvancePanel<'a, 'b, M, E, const S: usize, const W: us
     /// `(Λ, Λ_w)`
     pub sum: &'a mut StridedMatrix<'b, E>,
     pub column: usize,
-    /// Only the lower triangle is wanted.
+    /// Whether the step is the first of the interval: only the lower triangle is used.
     pub is_first: bool,
-    /// `Λ_{n+1} = 0`
+    /// Whether the step is the last of the interval: `Λ_{n+1} = 0`.
     pub is_last: bool,
     pub inverse: &'a Option<InverseWeights<E, S>>,
-    /// How many entries of the Jacobian, column by column, belong to rows above the triangle.
+    /// Number of entries of the Jacobian, in column order, before the first row of the triangle.
     pub skipped_entries: &'a mut usize,
 }
 
@@ -105,7 +103,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
         self.rows_from_entries::<A>(row);
     }
 
-    /// The row of a state, from `f_ẋ`.
+    /// Computes the row of a state from `f_ẋ`.
     #[inline(always)]
     fn row_from_derivatives<A: Arithmetic>(
         &mut self,
@@ -142,7 +140,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
         self.write_row(row, &panel_row);
     }
 
-    /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
+    /// Computes the rows from `begin` on from the entries of `f_x`, `f_u` and `f_p`.
     #[inline(always)]
     fn rows_from_entries<A: Arithmetic>(&mut self, begin: usize) {
         let plan = self.plan;
@@ -150,20 +148,20 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
         let mut c = plan.facts().nonlinear_before[0];
         while let Some(&direction) = plan.structure().directions.get(row) {
             let variable = variable_of_direction(plan, direction as usize);
-            // One sum for each stage: an addition to one does not wait for that to another.
+            // One accumulator per stage, so that additions do not wait for each other.
             let mut sums = [[E::from_f64(0.0); W]; S];
             if !self.is_last
                 && let Some(lambda) = row_chunk::<E, W>(self.sum, row, self.column)
             {
                 sums[0] = *lambda;
             }
-            // Entries of algebraic states, and of rows that are not wanted, are passed by.
+            // Skips entries of algebraic states and of rows that are not computed.
             while let Some(of) = variable_of_entry(plan, position)
                 && of < variable
             {
                 position += 1;
             }
-            // Those are not wanted in later panels either.
+            // Later panels skip the same entries.
             if row == begin && (self.is_first || plan.facts().has_direct_rates && self.inverse.is_some()) {
                 *self.skipped_entries = position;
             }
@@ -204,21 +202,21 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
     }
 }
 
-/// The variable that an entry belongs to, in their order by columns.
+/// The variable of an entry, in column order.
 #[inline(always)]
 fn variable_of_entry<M: Plan>(plan: M, place: usize) -> Option<usize> {
     let &entry = plan.structure().by_column.get(place)?;
     Some(*plan.structure().jacobian.columns.get(entry as usize)? as usize)
 }
 
-/// The variable that a direction is.
+/// The variable of a direction.
 #[inline(always)]
 fn variable_of_direction<M: Plan>(plan: M, direction: usize) -> usize {
     let (nx, nz) = (plan.nx(), plan.nz());
     nx + direction + if direction < nx { 0 } else { nz }
 }
 
-/// A few columns of a row.
+/// `W` columns of a row.
 #[inline(always)]
 pub(in crate::irk) fn row_chunk<'a, E, const W: usize>(
     of: &'a StridedMatrix<'_, E>,
@@ -228,7 +226,7 @@ pub(in crate::irk) fn row_chunk<'a, E, const W: usize>(
     of.row(row, column)?.first_chunk()
 }
 
-/// `panel_row += G` of a curved variable.
+/// `panel_row += G` of a nonlinear variable.
 #[inline(always)]
 pub(in crate::irk) fn add_stages<A: Arithmetic, E: Lanes, const S: usize, const W: usize>(
     rows: StageRowLayout,

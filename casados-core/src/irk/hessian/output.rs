@@ -1,6 +1,6 @@
-//! Second derivatives, which are found as the lower triangle of a matrix over all directions that
-//! have any influence, to the matrices of results: those over one part of `w = (x₀, u, p)` have
-//! both triangles, those over two parts lie whole in the one that was found.
+//! Copies second derivatives from the lower triangle over all directions with influence to the
+//! matrices of results. Diagonal blocks of `w = (x₀, u, p)` get both triangles; off-diagonal blocks
+//! lie completely in the lower triangle.
 
 use super::products::StridedMatrix;
 use crate::irk::directions::column_of;
@@ -12,16 +12,16 @@ use crate::scalar::Lanes;
 use crate::shape::Matrix;
 use crate::structure::Structure;
 
-/// A lower triangle.
+/// The lower triangle of a symmetric matrix.
 pub(in crate::irk) struct HessianTriangle<'a, M, E> {
     pub plan: M,
     pub rows: StridedMatrix<'a, E>,
-    /// What an integrand adds, over all directions: a lower triangle, too.
+    /// The lower triangle of the second derivatives of an integrand, over all directions.
     pub integrand_hessian: Option<&'a [E]>,
 }
 
 impl<M: Plan, E: Lanes> HessianTriangle<'_, M, E> {
-    /// Writes the matrices of a result. Zero if all of them are finite, else NaN.
+    /// Writes the matrices of a result. Returns zero if all of them are finite, otherwise NaN.
     pub fn write<D: Dae>(&self, to: &mut Hessian<D, E>) -> E {
         let total = self.write_block::<X, X>(to.h_xx.as_mut_slice())
             + self.write_block::<U, U>(to.h_uu.as_mut_slice())
@@ -29,12 +29,12 @@ impl<M: Plan, E: Lanes> HessianTriangle<'_, M, E> {
             + self.write_block::<X, U>(to.h_xu.as_mut_slice())
             + self.write_block::<X, P>(to.h_xp.as_mut_slice())
             + self.write_block::<U, P>(to.h_up.as_mut_slice());
-        // Nothing times what is not finite is not a number.
+        // Zero times a non-finite number is NaN.
         E::from_f64(0.0) * total
     }
 
-    /// Its part over the directions of one part of `w` and those of another, which is not before
-    /// it; the sum, which is finite only if all of it is.
+    /// Writes the block of the rows of one part of `w` and the columns of the same or a later part.
+    /// Returns the sum, which is finite only if all elements are.
     fn write_block<const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, columns: &mut [E]) -> E {
         if columns.is_empty() {
             return E::from_f64(0.0);
@@ -43,12 +43,12 @@ impl<M: Plan, E: Lanes> HessianTriangle<'_, M, E> {
     }
 }
 
-/// The parts of `w`.
+/// Indices of the parts of `w`.
 const X: usize = 0;
 const U: usize = 1;
 const P: usize = 2;
 
-/// Where a part of `w` begins.
+/// The first element of a part of `w`.
 const fn block_begin(structure: &Structure, part: usize) -> usize {
     match part {
         X => 0,
@@ -58,7 +58,7 @@ const fn block_begin(structure: &Structure, part: usize) -> usize {
     }
 }
 
-/// The directions of a part that have any influence, as columns of the triangle.
+/// The range of columns of the triangle for the directions with influence in a part.
 const fn active_columns(structure: &Structure, part: usize) -> [usize; 2] {
     let directions = structure.directions;
     [
@@ -67,7 +67,7 @@ const fn active_columns(structure: &Structure, part: usize) -> [usize; 2] {
     ]
 }
 
-/// See [`HessianTriangle::part`].
+/// See [`HessianTriangle::write_block`].
 struct BlockKernel<'a, M, E, const OF_ROWS: usize, const OF_COLUMNS: usize> {
     triangle: &'a HessianTriangle<'a, M, E>,
     columns: &'a mut [E],
@@ -85,7 +85,7 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
         let (row, column) = (block_begin(structure, OF_ROWS), block_begin(structure, OF_COLUMNS));
         let count_of_rows = block_begin(structure, OF_ROWS + 1) - row;
         let all_active = structure.directions.len() == structure.column_of_direction.len();
-        // The directions of these rows that have any influence.
+        // The directions of these rows that have influence.
         let known = const {
             match M::KNOWN_STRUCTURE {
                 Some(structure) => Some(active_columns(structure, OF_ROWS)),
@@ -99,7 +99,7 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
             let column_values =
                 column_of(*plan, column + c).and_then(|c| rows.row(c, first)?.get(..end - first));
             let column_values = column_values.unwrap_or_default();
-            // What is in the triangle.
+            // Number of rows that the triangle contains.
             let count = if const { OF_ROWS == OF_COLUMNS } { c + 1 } else { count_of_rows };
             let Some(to) = to.get_mut(..count) else { continue };
             match column_values.get(..count) {
@@ -129,11 +129,11 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
     }
 }
 
-/// So many rows or columns are exchanged at a time.
+/// Number of rows and columns of a block that is transposed in registers.
 const TRANSPOSE_SIZE: usize = 4;
 
-/// Writes one triangle of a matrix of so many rows, the first elements of its columns, to the other
-/// one; the sum of the former.
+/// Mirrors the triangle of an `n × n` matrix that consists of the first elements of its columns;
+/// returns the sum of its elements.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn mirror_triangle<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
     let zero = E::from_f64(0.0);
@@ -142,7 +142,7 @@ fn mirror_triangle<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
         let Some((before, own)) = columns.split_at_mut_checked(begin * n) else { break };
         let count = TRANSPOSE_SIZE.min(n - begin);
         if count == TRANSPOSE_SIZE {
-            // Those of the columns before, which are whole squares.
+            // Blocks of preceding columns are whole squares.
             for (square, to) in before.chunks_exact_mut(TRANSPOSE_SIZE * n).enumerate() {
                 let mut numbers = [[zero; TRANSPOSE_SIZE]; TRANSPOSE_SIZE];
                 for (numbers, own) in numbers.iter_mut().zip(own.chunks_exact(n)) {

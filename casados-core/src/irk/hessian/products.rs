@@ -1,8 +1,8 @@
 //! `Σ_i D_iᵀ H_i D_i` over the stages of a step, with `H_i` sparse and symmetric: first `G = −H D`,
-//! a few columns at a time, then the lower triangle of `Dᵀ G`.
+//! a panel at a time, then the lower triangle of `Dᵀ G`.
 //!
-//! In a panel of `D` the stages of a variable lie beside each other, or, where it is large,
-//! variables of a stage do: what is multiplied is then in the nearest cache.
+//! In a panel of `D` the stages of a variable are adjacent; in a large panel the variables of a
+//! stage are, so that the factors of a product are in the L1 cache.
 
 use super::sparse_product::multiply;
 use crate::irk::directions::{panel, panels, static_columns};
@@ -11,36 +11,35 @@ use crate::linalg::{Arithmetic, Kernel, is_large_plan};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
-/// So many columns of `G` are there at a time: two panels, where registers are enough for their
-/// products, or one and what the adjoint makes of it (`matrix_adjoint`). In firmware memory is
-/// dearer than time.
+/// Number of columns of the memory for `G`: two panels if there are enough registers for their
+/// products, or `G` and `M` of one panel (`matrix_adjoint`). Firmware trades time for memory.
 pub const G_COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
 
-/// A matrix over all directions, row after row, whose rows are so far apart.
+/// A matrix over all directions, in row-major order, with the distance `stride` between rows.
 pub struct StridedMatrix<'a, E> {
     pub elements: &'a mut [E],
     pub stride: usize,
 }
 
 impl<E> StridedMatrix<'_, E> {
-    /// A row, from a column on.
+    /// A row from a column on.
     #[inline(always)]
     pub fn row(&self, row: usize, column: usize) -> Option<&[E]> {
         self.elements.get(row * self.stride + column..(row + 1) * self.stride)
     }
 
-    /// A row, from a column on.
+    /// A row from a column on.
     #[inline(always)]
     pub fn row_mut(&mut self, row: usize, column: usize) -> Option<&mut [E]> {
         self.elements.get_mut(row * self.stride + column..(row + 1) * self.stride)
     }
 }
 
-/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
-/// with zero.
+/// `sum −= Σ_i D_iᵀ H_i D_i` (lower triangle), with `H_i` given by its lower triangle; the sum
+/// starts at zero if `from_zero`.
 pub struct CongruenceKernel<'a, M, E, const S: usize> {
     pub plan: M,
-    /// Of all directions.
+    /// Number of columns of all directions.
     pub columns: usize,
     pub entries: &'a [[E; S]],
     pub d: &'a [E],
@@ -75,7 +74,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for CongruenceKernel<'_, M, E, S>
 }
 
 impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
-    /// `P` panels of `W` columns: all stages at a time, or pairs of them.
+    /// Processes `P` panels of `W` columns: all stages at a time, or pairs of stages.
     #[inline(always)]
     fn subtract_panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
         if const { stages_adjacent::<M, E, S>() } {
@@ -83,8 +82,7 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
             return;
         }
         let mut stage = 0;
-        // Rows that go through their columns together fit the registers with pairs of stages, or
-        // with wider panels.
+        // The rows of a term fit the registers with pairs of stages, or with wider panels.
         while const { W <= 4 } && stage + 2 <= S {
             self.subtract_stages::<A, 1, 2, W, P>(stage, column);
             stage += 2;
@@ -95,7 +93,7 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
         }
     }
 
-    /// `N` groups of `L` stages, which lie together, from a stage on.
+    /// Processes `N` groups of `L` adjacent stages, from `stage` on.
     #[inline(always)]
     fn subtract_stages<A: Arithmetic, const L: usize, const N: usize, const W: usize, const P: usize>(
         &mut self,
@@ -119,8 +117,8 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
         }
     }
 
-    /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of
-    /// `D` from another one on.
+    /// `sum −= Dᵀ G` for `count` rows of panels of `−G` from `g_begin` on, and of `D` from
+    /// `d_begin` on.
     #[inline(always)]
     fn subtract_tiles<A: Arithmetic, const W: usize, const P: usize>(
         &mut self,
@@ -156,9 +154,9 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
     }
 }
 
-/// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each
-/// tile is in registers while it goes through all variables at all stages, in as many accumulators
-/// as hide how long an addition takes. Above the diagonal it writes what nobody reads.
+/// `sum −= Dᵀ G` for a panel of `D` (rows from `row` on) and panels of `−G` (columns from `column`
+/// on). Each micro-tile stays in registers over all variables and stages, with as many accumulators
+/// as hide the latency of additions. Elements above the diagonal are written, but never read.
 #[inline(always)]
 fn subtract_panel_tiles<
     A: Arithmetic,
@@ -198,8 +196,8 @@ fn subtract_panel_tiles<
                 .row_mut(row + t * ROWS + r, column)
                 .and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
             let Some(columns) = columns else { continue };
-            // In registers: of loops over single elements the compiler makes one over rows, which
-            // lie far apart.
+            // Whole register rows: the compiler would turn loops over single elements into a loop
+            // over rows, which are far apart in memory.
             for (columns, tile) in columns.iter_mut().zip(tile) {
                 let mut sum = if from_zero { [E::from_f64(0.0); W] } else { *columns };
                 A::subtract_row(&mut sum, E::from_f64(1.0), tile);
@@ -209,7 +207,7 @@ fn subtract_panel_tiles<
     }
 }
 
-/// `tile − d gᵀ`, of `ROWS` elements of `d`.
+/// `tile − d gᵀ` for `ROWS` elements of `d`.
 #[inline(always)]
 fn subtract_outer<
     A: Arithmetic,

@@ -1,5 +1,5 @@
-//! `G = −H D`: the sparse second derivatives of a step times derivatives of its variables, a few
-//! columns at a time.
+//! `G = −H D`: the sparse second derivatives of a step times the derivatives of its variables, a
+//! panel at a time.
 
 use crate::irk::directions::panel;
 use crate::irk::forward::stage_sensitivities::stages_adjacent;
@@ -7,10 +7,10 @@ use crate::linalg::Arithmetic;
 use crate::model::Term;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::structure::MOST_ROWS;
+use crate::structure::MAX_INTERLEAVED_ROWS;
 
-/// `G = −H D` at all stages in the panel that begins with a column; its rows lie as those of the
-/// panel do.
+/// Computes `G = −H D` at all stages in the panel that begins with `column`; `G` has the row layout
+/// of the panel.
 #[inline(always)]
 pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Plan, E: Lanes, const S: usize, const W: usize>(
     plan: M,
@@ -30,7 +30,8 @@ pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Plan, E: Lanes, const S: 
     }
 }
 
-/// `G = −H D` at `N` groups of `L` stages, from a stage on, in `P` panels from a column on.
+/// Computes `G = −H D` for `N` groups of `L` stages, from `stage` on, in `P` panels from `column`
+/// on.
 #[inline(always)]
 pub(in crate::irk) fn multiply<
     A: Arithmetic,
@@ -62,8 +63,8 @@ pub(in crate::irk) fn multiply<
     while let Some(first) = terms.first() {
         let product = SparseProduct { entries, d: &of_d, stage };
         terms = match first.rows {
-            3 if const { MOST_ROWS >= 3 } => product.multiply_rows::<A, 3>(curved, terms, g),
-            2 if const { MOST_ROWS >= 2 } => product.multiply_rows::<A, 2>(curved, terms, g),
+            3 if const { MAX_INTERLEAVED_ROWS >= 3 } => product.multiply_rows::<A, 3>(curved, terms, g),
+            2 if const { MAX_INTERLEAVED_ROWS >= 2 } => product.multiply_rows::<A, 2>(curved, terms, g),
             _ => product.multiply_row::<A, 1>(curved, terms, g, 0),
         };
     }
@@ -79,9 +80,9 @@ struct SparseProduct<'a, E, const S: usize, const L: usize, const N: usize, cons
 impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
     SparseProduct<'_, E, S, L, N, W, P>
 {
-    /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied
-    /// with is fetched once for all of them, so many columns and stages at a time that it fits
-    /// registers beside them; of sixteen registers it seldom does.
+    /// Computes `R` rows of `G` with alternating terms, and returns the remaining terms. Rows of
+    /// `D` are loaded once for all `R` rows, with as many columns and stages at a time as fit the
+    /// registers; sixteen registers are mostly too few.
     #[inline(always)]
     fn multiply_rows<A: Arithmetic, const R: usize>(
         &self,
@@ -107,7 +108,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         }
     }
 
-    /// One of `R` rows, at all stages.
+    /// Computes one of `R` rows, at all stages.
     #[inline(always)]
     fn multiply_row<A: Arithmetic, const R: usize>(
         &self,
@@ -145,7 +146,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         terms
     }
 
-    /// `R` rows, `K` stages and `C` columns at a time.
+    /// Computes `R` rows, `K` stages and `C` columns at a time.
     #[inline(always)]
     fn rows_in_parts<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
         &self,
@@ -226,7 +227,7 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
         && let Some(panel_row) = panel_row.as_flattened_mut().as_flattened_mut().first_chunk_mut::<N>()
         && let (Some(values), Some(d)) = (values.first_chunk(), d.as_flattened().first_chunk())
     {
-        // The stages of one column side by side.
+        // The stages of one column fill a register.
         A::subtract_products(panel_row, values, d);
         return;
     }
@@ -235,7 +236,7 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
     }
 }
 
-/// From one of them on.
+/// The values from the stage `first` on.
 #[inline(always)]
 fn values_from<V>(all: &[V], first: usize) -> &[V] {
     all.get(first..).unwrap_or_default()

@@ -1,5 +1,5 @@
-//! Kinematic states `q`, with equations `q̇ − c v = 0`: no unknowns of iterations, of the
-//! elimination or of derivatives.
+//! Kinematic states `q`, with equations `q̇ − c v = 0`: condensed, so that they are no unknowns of
+//! Newton's method, of the elimination or of derivatives.
 //!
 //! ```text
 //! stages         k_q = c (x_v + hA k_v)      or c v of a control or parameter
@@ -8,8 +8,8 @@
 //! Jᵀ M = B       B_v ← B_v + c (hA)ᵀ B_q         M_q = B_q − Σ_r (f_q̇ + (hA)ᵀ f_q) M_r
 //! ```
 //!
-//! Everything else finds them in their places, with all other unknowns and equations: the end of a
-//! step, results, `D`, checks.
+//! In all arrays they have their places among the other unknowns and equations: at the end of a
+//! step, in results, in `D`, in backward errors.
 
 mod stages;
 
@@ -42,8 +42,8 @@ pub(super) fn minus_c<E: Copy, const S: usize>(kinematic: &Kinematic, jacobian: 
     }
 }
 
-/// An entry by which an equation depends on a kinematic state: its slot, its values, whether it
-/// multiplies the derivative.
+/// Returns an entry by which an equation depends on a kinematic state: its slot, its values, and
+/// whether it multiplies the derivative.
 #[inline(always)]
 pub(super) fn dependent_entry<'a, M: Plan, E, const S: usize>(
     plan: M,
@@ -55,7 +55,7 @@ pub(super) fn dependent_entry<'a, M: Plan, E, const S: usize>(
     Some((plan.slot(row), values, index < plan.structure().blocks[1]))
 }
 
-/// Whether no [unknown](crate::plan::Facts::unknowns) is known to be kinematic.
+/// Whether the plan is known to have no kinematic unknown.
 pub(super) const fn has_no_kinematic_unknowns<M: Plan>() -> bool {
     let Some(structure) = M::KNOWN_STRUCTURE else { return false };
     let (mut index, end) = DerivedFacts::of(structure).non_kinematic_range;
@@ -69,7 +69,8 @@ pub(super) const fn has_no_kinematic_unknowns<M: Plan>() -> bool {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
-    /// Solves `J X = B` for all unknowns in place; equations are in their slots.
+    /// Solves `J X = B` for all unknowns in place; the right-hand side of an equation is in its
+    /// slot.
     pub(super) fn solve<const W: usize>(
         &self,
         (coefficients, h): (&Coefficients<E, S>, E),
@@ -85,7 +86,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
         dispatch(CondensationKernel::<_, E, S, W, RECONSTRUCT> { plan, jacobian, a, h, rows: b.as_mut() });
     }
 
-    /// Solves `Jᵀ X = B` for all equations in place; the solution has them in their slots.
+    /// Solves `Jᵀ X = B` for all equations in place; the solution of an equation is in its slot.
     pub(super) fn solve_transposed<const W: usize>(
         &self,
         (coefficients, h): (&Coefficients<E, S>, E),
@@ -114,8 +115,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     }
 }
 
-/// What is done to rows of all unknowns before and after systems without kinematic states are
-/// solved.
+/// Operations on the rows of all unknowns, before and after the solution of the condensed system.
 pub(super) const ELIMINATE: u8 = 0;
 const RECONSTRUCT: u8 = 1;
 pub(super) const CONDENSE_TRANSPOSED: u8 = 2;
@@ -141,7 +141,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
     }
 }
 
-/// The same inside of a kernel.
+/// The operation inside of a kernel.
 #[inline(always)]
 pub(super) fn condense<
     A: Arithmetic,
@@ -173,16 +173,17 @@ struct VelocityRows<'a, M, E, const S: usize, const W: usize, const WHAT: u8> {
     jacobian: &'a [[E; S]],
     minus_ha: Block<E, S>,
     rows: &'a mut [PanelRow<E, S, W>],
-    /// What is known of a state between the first and the last entry by which others depend on it.
+    /// Partial sum of a state, between the first and the last entry by which equations depend on
+    /// it.
     sum: PanelRow<E, S, W>,
 }
 
-/// About how many instructions a product with `hA` takes.
+/// Approximate number of instructions of a product with `hA`.
 const fn product_instructions<E>(stages: usize, width: usize) -> usize {
     if size_of::<E>() > 8 { stages * stages * width } else { stages * stages * width.div_ceil(4) }
 }
 
-/// Between a kinematic state and its velocity.
+/// Operations between a kinematic state and its velocity.
 impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisitor
     for VelocityRows<'_, M, E, S, W, WHAT>
 {
@@ -213,7 +214,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisit
     }
 }
 
-/// Between a kinematic state and the equations that depend on it.
+/// Operations between a kinematic state and the equations that depend on it.
 struct DependentRows<'a, M, E, const S: usize, const W: usize, const WHAT: u8>(
     VelocityRows<'a, M, E, S, W, WHAT>,
 );
@@ -269,7 +270,7 @@ pub(super) struct KinematicPanel<'a, M, E, D, const S: usize, const W: usize> {
     /// `V` at the start of the step.
     pub v: &'a [[E; W]],
     pub directions: D,
-    /// The first column.
+    /// The first column of the panel.
     pub column: usize,
 }
 
@@ -293,7 +294,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
         row
     }
 
-    /// Writes `V_q + h c_i c V_v`, what entries of `f_q` multiply, to the rows of the states.
+    /// Writes `V_q + h c_i c V_v`, the factor of the entries of `f_q`, to the rows of the states.
     #[inline(always)]
     pub fn write_states<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [PanelRow<E, S, W>]) {
         for state in 0..StructureTable::Kinematic.row_count(self.plan.structure()) {
@@ -311,7 +312,8 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
         }
     }
 
-    /// Subtracts `f_q̇ c V_v` from the equations that depend on derivatives.
+    /// Subtracts `f_q̇ c V_v` from the equations that depend on the derivative of a kinematic
+    /// state.
     #[inline(always)]
     pub fn subtract_derivative_terms<A: Arithmetic>(&self, rows: &mut [PanelRow<E, S, W>]) {
         if const { !depend_on_derivatives::<M>() } {
@@ -329,7 +331,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
         }
     }
 
-    /// `dk_q = c (V_v + hA dk_v)`, and shows it.
+    /// Computes `dk_q = c (V_v + hA dk_v)`, and passes it to the visitor.
     #[inline(always)]
     pub fn reconstruct<A: Arithmetic>(
         &self,
@@ -382,7 +384,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, c
     }
 }
 
-/// Whether an equation may depend on the derivative of a kinematic state that is not its own.
+/// Whether an equation other than its own may depend on the derivative of a kinematic state.
 const fn depend_on_derivatives<M: Plan>() -> bool {
     let Some(structure) = M::KNOWN_STRUCTURE else { return true };
     let (dependents, mut index) = (structure.elimination.dependents, 0);

@@ -1,4 +1,4 @@
-//! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
+//! Kinematic states in Newton's method: `k_q` at the stages, before and after the iterations.
 
 use super::{has_kinematic_states, minus_c};
 use crate::irk::coefficients::Coefficients;
@@ -12,7 +12,7 @@ use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Writes `k_q`.
+    /// Computes `k_q`.
     pub(in crate::irk) fn reconstruct_kinematic(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -29,9 +29,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         reconstruct_stages(F::plan::<M>(), jacobian, points, x, y, a, h);
     }
 
-    /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is
-    /// evaluated there once; what is missing is [eliminated](Self::eliminate_missing) then. Where
-    /// stages are evaluated side by side that spares nothing, and of two stages little.
+    /// Whether the model and its Jacobian are evaluated once for all stages: with `k_q = 0` the
+    /// stages are identical. [`eliminate_omitted`](Self::eliminate_omitted) then adds the omitted
+    /// terms. Only for three stages or more that are not evaluated in one SIMD register.
     pub(in crate::irk) fn omits_kinematic(&mut self, jacobian: bool) -> bool {
         if const { !has_kinematic_states::<M>() } {
             return false;
@@ -40,8 +40,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         self.identical_stages
     }
 
-    /// The residual as it would be with `k_q`, by a Jacobian that all stages share as they share
-    /// the point where it is: what `k_q` adds to `x` differs between them only by the nodes.
+    /// Adds the terms of the omitted `k_q` to the residual. The stages share one Jacobian;
+    /// `h c_i k_q`, the omitted change of `x`, differs between stages by the node `c_i` only.
     pub(in crate::irk) fn eliminate_omitted(&mut self, coefficients: &Coefficients<E, S>) {
         if const { !has_kinematic_states::<M>() } {
             return;
@@ -52,8 +52,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         eliminate_missing(F::plan::<M>(), jacobian, points, f, a, h);
     }
 
-    /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
-    /// digit.
+    /// Computes `k_q` from [compensated](crate::irk::stages::compensated) sums.
     pub(in crate::irk) fn reconstruct_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
         if const { !has_kinematic_states::<M>() } {
             return;
@@ -63,7 +62,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         reconstruct_compensated(F::plan::<M>(), jacobian, points, y);
     }
 
-    /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
+    /// Eliminates the rounding errors of `k_q` from the residuals of the dependent equations.
     pub(in crate::irk) fn eliminate_rounding(&mut self, coefficients: &Coefficients<E, S>) {
         if const { !has_kinematic_states::<M>() } {
             return;
@@ -91,7 +90,8 @@ pub(in crate::irk) fn kinematic_derivative<M: Plan, E: Lanes, const S: usize>(
 }
 
 kernels! {
-    /// See [`Work::reconstruct`]; the second of `x` is what that has beyond its digits.
+    /// See [`StageWorkspace::reconstruct_kinematic`]; the second element of `x` is the
+    /// compensation.
     fn reconstruct_stages [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
         plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
@@ -122,7 +122,7 @@ kernels! {
         }
     }
 
-    /// See [`Work::eliminate_missing`].
+    /// See [`StageWorkspace::eliminate_omitted`].
     fn eliminate_missing [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
         plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
@@ -157,7 +157,7 @@ kernels! {
         }
     }
 
-    /// See [`Work::reconstruct_compensated`].
+    /// See [`StageWorkspace::reconstruct_compensated`].
     fn reconstruct_compensated [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
         plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
@@ -175,7 +175,7 @@ kernels! {
         }
     }
 
-    /// See [`Work::eliminate_rounded`].
+    /// See [`StageWorkspace::eliminate_rounding`].
     fn eliminate_rounded [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
         plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,

@@ -1,64 +1,66 @@
-//! The convergence test of Newton's method, lane by lane.
+//! The convergence test of Newton's method, for each lane.
 
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
 
-/// If an unknown has moved by less than this part of its size since it was measured, its size is
-/// still valid, and so is that of kinematic states which follow from it. (Of an unknown that was no
-/// larger than its first increment nothing is known.)
+/// If an unknown has changed by less than this fraction of its size since it was measured, its size
+/// is still valid, and so are those of the kinematic states that depend on it. After a first
+/// increment as large as the unknown, no size is valid.
 const MAX_RELATIVE_MOVE: f64 = 1.0 / 8.0;
 
-/// What is known of every lane. One that is neither active nor has converged has failed.
+/// State of the convergence test. A lane that is neither active nor converged has failed.
 #[derive(Clone, Copy)]
 pub(in crate::irk) struct ConvergenceTest<E: Lanes> {
-    /// Which lanes go on.
+    /// Lanes that continue to iterate.
     pub active: E::Mask,
-    /// Which have converged.
+    /// Lanes that have converged.
     pub converged: E::Mask,
-    /// The increment before.
+    /// Size of the last increment.
     last_increment: E,
-    /// How fast increments shrink; zero if that is not known.
+    /// Contraction rate `θ`; zero if unknown.
     rate: E,
-    /// How far unknowns have moved since they were measured, in parts of their sizes; infinite if
+    /// Change of the unknowns since their sizes were measured, relative to their sizes; infinite if
     /// increments were as large.
     relative_move: E,
-    /// What the next increment has to be below.
+    /// Bound of the expected next increment.
     tolerance: E,
-    /// Of linear equations the residual tells, not the increment.
+    /// Whether the equations are linear: their convergence is decided by the residual, not by the
+    /// increment.
     linear: bool,
 }
 
-/// Which increment the test takes.
+/// The kind of increment for a test.
 #[derive(Clone, Copy)]
 pub(in crate::irk) enum IncrementKind {
-    /// The first one of a step, with factors that are `new` or older ones.
+    /// The first increment of a step, with `new_factors` or older ones.
     First { new_factors: bool },
-    /// A later one.
+    /// A later increment.
     Subsequent,
-    /// The last one again, in lanes that have converged, with the sizes that the unknowns have now.
+    /// The last increment of lanes that have converged, measured again relative to the present
+    /// sizes of the unknowns.
     Remeasured,
 }
 
-/// What all lanes together have to say.
+/// The result of a convergence test over all lanes.
 #[derive(Clone, Copy, Default)]
 pub(in crate::irk) struct Status {
-    /// Some lane goes on.
+    /// Whether some lane is active.
     pub active: bool,
-    /// Some lane does no longer.
+    /// Whether some lane stopped in this test.
     pub lane_stopped: bool,
-    /// Increments of some active lane grow.
+    /// Whether increments of some active lane grow, `θ > 1`.
     pub increments_grow: bool,
-    /// Those of some active lane hardly shrink.
+    /// Whether increments of some active lane stagnate, `θ ≥ 1/2`.
     pub stagnates: bool,
-    /// In some lane unknowns may no longer be of the size that was measured.
+    /// Whether sizes of unknowns in some lane may be outdated.
     pub sizes_outdated: bool,
-    /// How many more increments are expected until the tolerance, in the slowest lane.
+    /// Predicted number of iterations to the tolerance, in the slowest lane.
     pub predicted_iterations: f64,
 }
 
 impl<E: Lanes> ConvergenceTest<E> {
-    /// With factors for which increments shrank by `rate`; zero if that is not known.
+    /// Starts the test, with factors of contraction rate `rate`; zero if it is unknown.
     pub fn start(tolerance: f64, rate: f64, linear: bool) -> Self {
         let zero = E::from_f64(0.0);
         let (all, none) = (E::le(zero, zero), E::lt(zero, zero));
@@ -74,15 +76,15 @@ impl<E: Lanes> ConvergenceTest<E> {
         }
     }
 
-    /// After an increment of this `size`, and what is expected of the `next` one.
+    /// Updates the test with the `size` of an increment, and the expected size of the next one.
     #[inline]
     pub fn update(&mut self, kind: IncrementKind, size: E, expected_next: E) -> Status {
         let test = TestUpdate { test: self, kind, size, next: expected_next };
-        // What one lane says is known in registers.
+        // With one lane the status stays in registers.
         if const { E::LANES == 1 } { test.status() } else { dispatch(test) }
     }
 
-    /// Lanes that hardly make progress have converged where their equations are `satisfied`.
+    /// Marks stagnating lanes as converged if their residual is `satisfied`.
     pub fn accept_satisfied(&mut self, satisfied: E::Mask) {
         let accepted = E::and(self.stagnating_lanes(), satisfied);
         self.active = E::and(self.active, E::not(accepted));
@@ -94,8 +96,8 @@ impl<E: Lanes> ConvergenceTest<E> {
         E::and(self.active, E::le(E::from_f64(0.5), self.rate))
     }
 
-    /// The slowest rate of those that have converged: lanes that failed have no say in what the
-    /// others do next.
+    /// Returns the largest rate of the converged lanes; failed lanes do not affect the following
+    /// steps of the others.
     pub fn slowest_rate(&self) -> f64 {
         let mut cell: E::Cell = Zeroable::zeroed();
         E::select(self.converged, self.rate, E::from_f64(0.0)).store(&mut cell);
@@ -103,7 +105,7 @@ impl<E: Lanes> ConvergenceTest<E> {
     }
 }
 
-/// See [`ConvergenceTest::take`].
+/// See [`ConvergenceTest::update`].
 struct TestUpdate<'a, E: Lanes> {
     test: &'a mut ConvergenceTest<E>,
     kind: IncrementKind,
@@ -145,8 +147,8 @@ impl<E: Lanes> TestUpdate<'_, E> {
             IncrementKind::First { .. } | IncrementKind::Subsequent => {
                 let mut expected_increment = size;
                 if let IncrementKind::First { new_factors: new } = kind {
-                    // What the last step found out holds for its factors only; and too roughly to
-                    // stop by it.
+                    // The rate of the last step is valid for the same factors only, and too
+                    // inaccurate to stop the iteration.
                     rate = if new { zero } else { rate };
                     moved = E::select(E::lt(size, one), zero, E::from_f64(f64::INFINITY));
                 } else {
@@ -186,8 +188,7 @@ impl<E: Lanes> TestUpdate<'_, E> {
     }
 }
 
-/// How many times a size is to be multiplied by a rate to be no larger than the tolerance; 64 times
-/// at most.
+/// Returns the number of iterations at this rate until the size is below the tolerance, at most 64.
 #[inline(always)]
 pub(in crate::irk) fn predicted_iterations<E: Lanes>(
     active: E::Mask,

@@ -1,16 +1,16 @@
-//! The careful way: Newton's method with the current Jacobian in every iteration, or that of the
-//! first one, as long as increments shrink by it, if it is to be [frozen](Jacobian::Frozen); the
-//! whole matrix pivoted, and every value looked at. It is taken where there is no plan of
-//! elimination, and where the fast way did not arrive: then it gives the solution, or says what is
-//! wrong.
+//! Dense fallback: Newton's method with partial pivoting of the whole matrix and checks of every
+//! value. The Jacobian is updated in every iteration; a [frozen](Jacobian::Frozen) one as soon as
+//! increments do not halve. It is used without a planned elimination order, and after the planned
+//! elimination has failed: then it either converges or returns the error.
 //!
-//! A fixed number of iterations is made without a test. Others have converged as soon as one of
-//! these holds, both of them invariant under scaling of equations and of variables:
+//! A fixed number of iterations has no convergence test. Otherwise the iteration has converged if
+//! one of these conditions holds, both invariant under scaling of equations and variables:
 //! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
-//! - the increment that would come next, at most `θ/(1−θ) ‖Δ‖`, is below the tolerance.
+//! - the expected next increment, at most `θ/(1−θ) ‖Δ‖`, is below the tolerance.
 //!
-//! Where rounding errors of the model are larger than expected, residual and increments stop
-//! shrinking. Then they have converged too if either is small: more cannot be known.
+//! If rounding errors of the model are larger than expected, residual and increments stagnate. The
+//! iteration has then converged if the residual is below 256 ε of its terms or the increments are
+//! below the bound for stagnation.
 
 use crate::error::{Error, Place, Quantity};
 use crate::finite::find_non_finite;
@@ -24,14 +24,13 @@ use crate::scalar::Real;
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
-/// Residuals below this many ε of their terms are rounding errors.
+/// Bound of rounding errors of a residual, in ε relative to its terms.
 const RESIDUAL_ROUNDING: f64 = 4.0;
-/// Residuals that no longer shrink are rounding errors of the model below this many ε of their
-/// terms.
+/// Bound of a stagnating residual that counts as rounding error, in ε relative to its terms.
 const STAGNATED_RESIDUAL: f64 = 256.0;
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// Solves the stages of a step from the start values in `y`.
+    /// Solves for the stages of a step from the initial guess in `y`.
     ///
     /// # Errors
     /// A value of the model that is not finite, a singular matrix, no convergence.
@@ -69,8 +68,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
                 let (residual, equation, stage) = self.relative_residual();
                 let stagnates = iteration > 1 && residual >= last_residual;
                 last_residual = residual;
-                // Start values that happen to be good are not yet as good as what one iteration
-                // makes of them.
+                // At least one iteration is made, even from an accurate initial guess.
                 if iteration > 0 && residual <= rounding || stagnates && residual <= noise {
                     return Ok(());
                 }
@@ -92,8 +90,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
             let increment = self.subtract_dense_increment(y);
             iteration += 1;
             statistics.iterations += 1;
-            // The first Jacobian does as long as increments shrink to half; one that is no smaller
-            // than the last one is not made.
+            // The first Jacobian is kept while increments halve; an increment that does not shrink
+            // is undone.
             let is_rounding = increment.size <= T::from_f64(T::STAGNATION);
             if tests_convergence
                 && !evaluates_jacobian
@@ -119,7 +117,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         }
     }
 
-    /// Factors of the Jacobian that is stored, the whole matrix pivoted.
+    /// Factorises the stored Jacobian with partial pivoting of the whole matrix.
     ///
     /// # Errors
     /// [`Error::Singular`]
@@ -144,8 +142,10 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         )
     }
 
+    /// Checks that the model has finite values.
+    ///
     /// # Errors
-    /// The first value of the model that is not finite: of the residual, which says more, or of the
+    /// The first non-finite value: of the residual, which is more informative, or else of the
     /// Jacobian.
     pub(crate) fn check_model(&self, step: usize, iteration: usize) -> Result<(), Error> {
         let (f, jacobian) = (self.f.as_ref(), self.linearization.jacobian.as_ref());
@@ -164,9 +164,9 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         Ok(())
     }
 
-    /// The largest residual relative to the magnitude of its terms, `|f_r| / Σ_c |∂f_r/∂v_c v_c|`,
-    /// and its equation and stage. Rounding errors of the model are a few ε of this, however
-    /// equations and variables are scaled.
+    /// Returns the largest residual relative to the magnitude of its terms,
+    /// `|f_r| / Σ_c |∂f_r/∂v_c v_c|`, with its equation and stage. Rounding errors of the model are
+    /// a few ε of it, independently of the scaling of equations and variables.
     pub(crate) fn relative_residual(&self) -> (T, usize, usize) {
         let mut magnitude: ArrayK<M, [T; S]> = Zeroable::zeroed();
         let Pattern { rows, columns } = M::STRUCTURE.jacobian;
@@ -184,8 +184,9 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         let mut largest = (T::ZERO, 0, 0);
         for (equation, (f, magnitude)) in self.f.as_ref().iter().zip(magnitude.as_ref()).enumerate() {
             for (stage, (f, magnitude)) in f.iter().zip(magnitude).enumerate() {
-                // A residual of zero is zero even where all terms are, and none is rounded finer
-                // than normal numbers are. Terms that overflow say nothing.
+                // A zero residual is zero even if all its terms are zero; sums below the normal
+                // numbers count as the smallest normal number; if the terms overflow, the relative
+                // residual is one.
                 let relative = if *f == T::ZERO {
                     T::ZERO
                 } else if magnitude.is_finite() {
@@ -201,8 +202,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         largest
     }
 
-    /// `y ← y − Δ`; the largest increment relative to the unknown, of which the largest stage
-    /// counts.
+    /// `y ← y − Δ`; returns the largest increment relative to its unknown, at the stage where the
+    /// unknown is largest.
     fn subtract_dense_increment(&self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
         let mut largest = Increment { size: T::ZERO, unknown: 0 };
         for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.increment.as_ref()).enumerate() {
@@ -214,8 +215,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
                     change = delta.abs();
                 }
             }
-            // No increment is none, also of zero; an unknown that became zero changed by all it
-            // was.
+            // A zero increment counts as zero, also for an unknown of zero; an unknown that became
+            // zero changed by its whole value.
             let relative = if change == T::ZERO {
                 T::ZERO
             } else {
@@ -228,7 +229,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         largest
     }
 
-    /// The increment by the factors that are there.
+    /// Solves for the increment with the available factors.
     pub(super) fn solve_dense(&mut self, coefficients: &Coefficients<T, S>) {
         for (equation, f) in self.f.as_ref().iter().enumerate() {
             if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
@@ -250,24 +251,24 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     }
 }
 
-/// Whether the increment that comes next is small enough, by how the last two shrank.
+/// Whether the expected next increment, from the rate of the last two, is small enough.
 fn has_converged<T: Real>(size: T, last: T, tolerance: T) -> bool {
     let rate = size / last;
-    // With the current Jacobian it will be less, but how much less differs from unknown to unknown.
+    // With a current Jacobian the rate decreases too, but differently for each unknown.
     let expected_next = rate / (T::ONE - rate) * size;
-    // A rate near one says nothing about the next increment.
+    // A rate above one half does not predict the next increment.
     let contracts = rate + rate < T::ONE;
     contracts && expected_next <= tolerance || !contracts && size <= T::from_f64(T::STAGNATION)
 }
 
 /// The largest increment of an iteration.
 struct Increment<T> {
-    /// Relative to the unknown.
+    /// The increment relative to its unknown.
     size: T,
     unknown: usize,
 }
 
-/// Name of an unknown `(k, z)`: of `k` the state whose derivative it is.
+/// Returns the name of an unknown `(k, z)`; for `k` the name of the state.
 pub(crate) fn unknown_name<M: Dae>(unknown: usize) -> &'static str {
     let (x, z) = (M::STRUCTURE.x, M::STRUCTURE.z);
     let name = if unknown < x.len() { x.get(unknown) } else { z.get(unknown - x.len()) };

@@ -1,8 +1,8 @@
-//! Where equations lose their solution: `∂f/∂(ẋ, z)` becomes singular, along an algebraic state.
+//! Folds: points at which `∂f/∂(ẋ, z)` becomes singular along an algebraic state.
 //!
-//! At a fold two solutions meet and vanish. The determinant has another sign on either branch, and
-//! is zero between them (W. C. Rheinboldt, Methods for Solving Systems of Nonlinear Equations,
-//! 1998, chapter 9), so that Newton's method beyond the fold goes from one side to the other.
+//! At a fold two branches of solutions meet and end. The determinant has opposite signs on the
+//! branches, and is zero at the fold (W. C. Rheinboldt, Methods for Solving Systems of Nonlinear
+//! Equations, 1998, chapter 9). Beyond a fold Newton's method alternates between the two sides.
 
 use super::dense_fallback::unknown_name;
 use crate::error::Error;
@@ -15,36 +15,37 @@ use crate::shape::Shape;
 use crate::statistics::Statistics;
 use alloc::vec::Vec;
 
-/// So many more iterations of Newton's method are to lead to the other side of a fold: each leads
-/// there or back.
+/// Number of further Newton iterations that may find the opposite sign of the determinant: each
+/// changes the side of the fold or not.
 const MAX_SIGN_CHANGE_ITERATIONS: usize = 16;
-/// Bisections between a point on either side.
+/// Number of bisections between two points on opposite sides.
 const BISECTIONS: usize = 40;
 
-/// What complete pivoting finds out about `∂f/∂(ẋ, z)`.
+/// Result of complete pivoting of `∂f/∂(ẋ, z)`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PivotAnalysis {
     /// Whether the determinant is negative.
     pub negative: bool,
-    /// The smallest pivot relative to the largest one, of `∂f_r/∂v_c v_c` relative to the largest
-    /// term of its equation.
+    /// Smallest pivot relative to the largest, of the terms `∂f_r/∂v_c v_c` relative to the largest
+    /// term of their equation.
     pub smallest: f64,
-    /// The algebraic state that has the largest part in the vector that the matrix nearly maps to
-    /// zero, as an unknown.
+    /// The algebraic state (as an unknown) with the largest component of the approximate null
+    /// vector.
     pub unknown: Option<usize>,
 }
 
 impl PivotAnalysis {
-    /// A solution that is known to a few ε is `√ε` away from the other branch of a fold; the bound
-    /// is twice as many digits away from that.
+    /// Whether the matrix is singular up to rounding. A solution that is known to a few ε is at a
+    /// distance of `√ε` from the other branch at a fold; the bound is the square root of that,
+    /// `ε^¼`.
     pub fn is_singular<T: Real>(&self) -> bool {
         self.smallest <= Scalar::sqrt(Scalar::sqrt(T::EPSILON))
     }
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// The error of a step, whose iteration led from some start values to `y`, with the algebraic
-    /// state along which `∂f/∂(ẋ, z)` becomes singular between them.
+    /// Returns the error of a step whose iteration led from `start` to `y`, with the algebraic
+    /// state along which `∂f/∂(ẋ, z)` becomes singular in between, if there is one.
     #[cold]
     pub(in crate::irk) fn explain_fold(
         &mut self,
@@ -79,8 +80,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         singular.map_or(error, |index| Error::SingularAlgebraic { unknown: unknown_name::<M>(index), at })
     }
 
-    /// The sign of the determinant at the start values, if it has the other one at `y`, or where a
-    /// few more iterations lead to from there.
+    /// Returns whether the determinant is negative at the start, if it has the opposite sign at `y`
+    /// or after a few more iterations from `y`.
     fn find_sign_change(
         &mut self,
         coefficients: &Coefficients<T, S>,
@@ -104,7 +105,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         None
     }
 
-    /// `∂f/∂(ẋ, z)` at the last stage.
+    /// Analyses `∂f/∂(ẋ, z)` at the last stage.
     fn analyse_pivots_at(
         &mut self,
         coefficients: &Coefficients<T, S>,
@@ -120,8 +121,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     }
 }
 
-/// Eliminates `∂f/∂(ẋ, z)` of a model, whose Jacobian has these entries at these variables; nothing
-/// if they are not finite, or there is no memory.
+/// Analyses `∂f/∂(ẋ, z)` of a model from the entries of its Jacobian and its variables. Returns
+/// `None` if values are not finite or memory is missing.
 #[cold]
 pub(crate) fn analyse_pivots<M: Dae>(
     entry: impl Fn(usize) -> f64,
@@ -161,7 +162,7 @@ fn zeros(count: usize) -> Option<Vec<f64>> {
     Some(list)
 }
 
-/// The pivots, and the vector of length one in the last unknown.
+/// Eliminates with complete pivoting; the null vector is scaled to one in its last unknown.
 fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<PivotAnalysis> {
     if a.iter().any(|a| !a.is_finite()) {
         return None;
@@ -209,14 +210,15 @@ fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<PivotAnalysis
 mod tests {
     use super::complete_pivoting;
 
-    /// The determinant's sign, and the vector that a singular matrix maps to zero.
+    /// The sign of the determinant, and the null vector of a singular matrix.
     #[test]
     fn signs_and_directions() {
         for (matrix, negative) in [([0.0, 1.0, 1.0, 0.0], true), ([0.0, -3.0, 1.0, 0.0], false)] {
             let found = complete_pivoting(&mut matrix.clone(), 2, 0).unwrap();
             assert_eq!(found.negative, negative);
         }
-        // (1, 0, -2): the first equation has twice the first unknown and the third one.
+        // Null vector (1, 0, −2): in the first equation the coefficient of the first unknown is
+        // twice that of the third.
         let mut matrix = [2.0, 0.0, 1.0, 0.0, 5.0, 0.0, 4.0, 1.0, 2.0];
         let found = complete_pivoting(&mut matrix, 3, 0).unwrap();
         assert!(found.smallest < 1e-15 && found.unknown != Some(1), "{found:?}");

@@ -1,4 +1,5 @@
-//! What an iteration of Newton's method does to the unknowns, and how far it went.
+//! Increments of Newton's method: the update of the unknowns, and the statistics for the
+//! convergence test.
 
 use super::norm::{KinematicScales, MeasureIncrement, larger_accumulator, unknowns_of, unknowns_of_mut};
 use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row, kernels};
@@ -6,7 +7,7 @@ use crate::plan::{Plan, StructureTable};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 
-/// The residual in the slots of the equations; that of kinematic states is zero.
+/// Copies the residual to the slots of the equations; residuals of kinematic states are zero.
 pub(in crate::irk) struct PlaceResidual<'a, M: Plan, E: Plain, const S: usize> {
     pub plan: M,
     pub f: &'a M::K<[E; S]>,
@@ -42,7 +43,7 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for PlaceResidual<'_, M, E, S
 }
 
 kernels! {
-    /// The largest residual, of what is a number.
+    /// Returns the largest magnitude of a residual, ignoring values that are not numbers.
     pub(in crate::irk) fn largest [E: Lanes] [E] <A>(residual: &'k [E]) -> E {
         let mut largest = [E::from_f64(0.0); 8];
         let (eights, rest) = residual.as_chunks::<8>();
@@ -73,9 +74,10 @@ kernels! {
     }
 }
 
-/// `y ← y − Δ`; the size of the increment, and zero if the next one is expected to be below the
-/// tolerance: otherwise one, and by how much the increment of an unknown is larger than its last
-/// one. (Two numbers are returned in registers, three are not.)
+/// `y ← y − Δ`. Returns the size of the increment, and zero if the next increment is expected to be
+/// below the tolerance, otherwise `1 + growth`, where `growth` is the largest difference between
+/// the increment of an unknown and its last one. (Two numbers are returned in registers, three are
+/// not.)
 pub(in crate::irk) struct UpdateUnknowns<'a, M: Plan, E: Lanes, const S: usize> {
     pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
@@ -89,7 +91,7 @@ pub(in crate::irk) struct UpdateUnknowns<'a, M: Plan, E: Lanes, const S: usize> 
     pub floor: E,
     pub tolerance: E,
     pub full_newton: bool,
-    /// Whether weights are to be found, and nothing is known of the increment before.
+    /// Whether to measure the sizes of the unknowns; there is no last increment to compare with.
     pub measures_sizes: bool,
 }
 
@@ -123,7 +125,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for UpdateUnknowns<'_, M, E, S> {
             let measure = MeasureIncrement { plan, scales, x, y, increment, weights, sizes, h, floor };
             return (measure.run::<A>(), one);
         }
-        // Four unknowns side by side, and the rest one by one.
+        // Four unknowns at a time, then the remaining ones.
         let (y, last_y) = unknowns_of_mut(plan, y.as_mut()).as_chunks_mut::<4>();
         let (increments, last) = unknowns_of_mut(plan, increment.as_mut()).as_chunks_mut::<4>();
         let (weights, last_weights) = unknowns_of(plan, weights.as_ref()).as_chunks::<4>();
@@ -146,15 +148,15 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for UpdateUnknowns<'_, M, E, S> {
     }
 }
 
-/// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A
-/// single lane is, or it would not be here.
+/// `y ← y − Δ` of some unknowns, in lanes that are `active`; the increments of other lanes become
+/// zero. A single lane is always active here.
 #[inline(always)]
 fn subtract_active<E: Lanes, const S: usize, const N: usize>(
     y: &mut [[E; S]; N],
     increments: &mut [[[E; 1]; S]; N],
     active: E::Mask,
 ) {
-    // In registers: the optimiser cannot know that they do not overlap.
+    // Local copies stay in registers: the optimiser cannot prove that the arguments do not overlap.
     let (mut new, mut deltas) = (*y, *increments);
     for (y, [delta]) in new.as_flattened_mut().iter_mut().zip(deltas.as_flattened_mut()) {
         if const { E::LANES > 1 } {
@@ -168,15 +170,15 @@ fn subtract_active<E: Lanes, const S: usize, const N: usize>(
     }
 }
 
-/// What is known of the increments of some unknowns, in `N` accumulators.
+/// Statistics of the increments of some unknowns, in `N` accumulators.
 struct IncrementStatistics<E, const N: usize> {
     largest: [E; N],
-    /// By how much one, and the one that is expected next, is too large; not positive if that is
-    /// below the tolerance.
+    /// Excess over the tolerance of the increment and of the expected next one, whichever is
+    /// smaller.
     excess: [E; N],
-    /// By how much one is larger than the one before.
+    /// Growth of the increment over the last one.
     growth: [E; N],
-    /// The sum of what is not a number is not a number, which a maximum may lose.
+    /// Sum of the increments: it is NaN if one of them is, which a maximum may lose.
     sum: [E; N],
     tolerance: E,
     full_newton: bool,
@@ -190,7 +192,7 @@ impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
         Self { largest: zeros, excess, growth: zeros, sum: zeros, tolerance, full_newton: full }
     }
 
-    /// Takes `N` unknowns into account, whose last increments had these sizes.
+    /// Includes `N` unknowns, with the `sizes` of their last increments.
     #[inline(always)]
     fn include<const S: usize>(
         &mut self,
@@ -200,7 +202,7 @@ impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
     ) {
         let old = *sizes;
         let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
-        // Stage by stage, so that what is done to unknowns is done to vectors.
+        // The loop over stages is outside, so that operations on the unknowns are vectorised.
         #[allow(clippy::needless_range_loop)]
         for i in 0..S {
             for n in 0..N {
@@ -212,13 +214,13 @@ impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
         for n in 0..N {
             new[n] = new[n] * weights[n];
         }
-        // By how much increments grow: what they are asked is all of it.
+        // The growth of all increments.
         let mut growth = [E::from_f64(0.0); N];
         for n in 0..N {
             growth[n] = new[n] - old[n];
         }
-        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only
-        // where it must be.
+        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, compared with the tolerance; without
+        // a division where possible.
         if self.full_newton {
             for n in 0..N {
                 let rate = new[n] / old[n];
@@ -230,11 +232,10 @@ impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
             }
         }
         for n in 0..N {
-            // Where increments hardly shrink, nothing is expected but that the next one is as
-            // large.
+            // For stagnating increments the next one is expected to be at least as large.
             let expected = excess[n].max(new[n] + growth[n]);
             let increment_part = new[n] - self.tolerance;
-            // The smaller one.
+            // The minimum of both.
             self.excess[n] = (-(-increment_part).max(-expected)).max(self.excess[n]);
             self.growth[n] = growth[n].max(self.growth[n]);
             self.largest[n] = new[n].max(self.largest[n]);
@@ -242,7 +243,7 @@ impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
         *sizes = new;
     }
 
-    /// The largest increment, the largest excess, the largest growth, the sum.
+    /// Returns the largest increment, the largest excess, the largest growth, and the sum.
     #[inline(always)]
     fn reduce(&self) -> [E; 4] {
         let zero = E::from_f64(0.0);

@@ -5,29 +5,30 @@
 //! ```
 //!
 //! Increments are measured relative to the size of each unknown,
-//! `‖Δ‖ = max_c max_i |Δ_ci| / max_i |y_ci|`: however equations and unknowns are scaled. (For a
-//! derivative `ẋ` a change that rounds to none in `x` is none.) They shrink by `θ`, so that the
-//! next one is expected to be `θ ‖Δ‖/(1−θ)` with a Jacobian that was kept (Hairer and Wanner,
-//! Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since then `θ` squares too. Both are
-//! asked unknown by unknown: a norm of all would let a linear one, corrected at once, speak for a
-//! nonlinear one. It has converged as soon as the next increment is below the tolerance. Where
-//! increments stop shrinking because the rounding errors of the model are larger than expected, it
-//! has converged too if they are small, or if the residual is at the level of the rounding errors
-//! of its terms: more cannot be known. (Where a model rests, unknowns are differences of large
-//! terms that cancel: they have no digits by which an increment could be small.)
+//! `‖Δ‖ = max_c max_i |Δ_ci| / max_i |y_ci|`, which is invariant under scaling of equations and
+//! unknowns. (A change of a derivative `ẋ` that rounds to zero in `x` counts as zero.) With
+//! contraction rate `θ` the next increment is expected to be `θ ‖Δ‖/(1−θ)` with a constant Jacobian
+//! (Hairer and Wanner, Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since `θ` then
+//! decreases quadratically. Both are evaluated for each unknown: in a norm over all unknowns a
+//! linear one, which is exact after one iteration, would hide a nonlinear one. The iteration has
+//! converged as soon as the next increment is expected to be below the tolerance. Increments
+//! stagnate if rounding errors of the model are larger than expected. The iteration has then
+//! converged if increments are small, or if the residual is at the level of the rounding errors of
+//! its terms. (In a steady state the unknowns are differences of large terms that cancel, so that
+//! relative increments remain large.)
 //!
-//! [Kinematic](crate::model::Kinematic) states, as `q` in `q̇ = v`, are no unknowns: their `k`
-//! follows from that of `v` before each iteration and after the last, whatever start values are
-//! given for it.
+//! [Kinematic](crate::model::Kinematic) states, as `q` in `q̇ = v`, are no unknowns: their `k` is
+//! computed from that of `v` before each iteration and after the last one; start values of it are
+//! ignored.
 //!
-//! Which Jacobian the iteration takes follows the rule of `jacobian_policy`. An increment by an
-//! older one that is larger than the last one, in any unknown, is [not made](super::rejection): it
-//! may lead to another root than Newton's method does.
+//! `jacobian_policy` chooses the Jacobian of the iteration. If an increment with an older Jacobian
+//! exceeds the last one, in any unknown, it is [rejected](super::rejection): it may lead to another
+//! root than Newton's method.
 //!
-//! Linear equations take one iteration; then their residual is looked at, and refined if digits
-//! were lost; and whether they [determine](super::near_singular) a solution.
+//! Linear equations take one iteration. Their residual is then checked, with refinement if digits
+//! were lost, and so is whether they [determine](super::near_singular) the solution.
 //!
-//! All of this goes on in every lane at once: a lane that has converged waits for the others.
+//! All lanes iterate together: a converged lane waits for the others.
 
 use super::convergence::{ConvergenceTest, IncrementKind, Status};
 use super::increment::{PlaceResidual, UpdateUnknowns, largest, subtract_increment};
@@ -48,50 +49,50 @@ use core::mem::take;
 
 /// Increments below this many ε are rounding errors.
 const INCREMENT_ROUNDING: f64 = 1.0;
-/// Where sums over the steps are compensated, what an iteration leaves undone must not add up
-/// either: it has the same sign in every step.
+/// With compensated sums over the steps the error of the iteration must be smaller, since it has
+/// the same sign in every step and accumulates.
 const COMPENSATED_INCREMENT_ROUNDING: f64 = 1.0 / 64.0;
 
-/// Linear equations are refined so often if one iteration was not enough.
+/// Maximal number of refinements of linear equations.
 const MAX_REFINEMENTS: usize = 4;
 
 /// The equations of the stages of a step.
 pub(crate) struct StageEquations<'a, M: Dae, E: Lanes, const S: usize, F: Fallback> {
     pub coefficients: &'a Coefficients<E, S>,
-    /// Where the factors are that are valid, if that is not where new ones are made.
+    /// The linearisation with the valid factors; `None` if they are in the workspace.
     pub stored_linearization: Option<&'a Linearization<M, E, S, F>>,
-    /// Which step.
+    /// Index of the step.
     pub n: usize,
-    /// The state at its start.
+    /// State at the start of the step.
     pub x: &'a ArrayX<M, E>,
 }
 copy!(['a, M: Dae, E: Lanes, const S: usize, F: Fallback] StageEquations<'a, M, E, S, F>);
 
-/// How an iteration ended.
+/// The result of an iteration.
 pub(crate) struct NewtonResult<E: Lanes> {
-    /// Which lanes have converged.
+    /// Lanes that have converged.
     pub converged: E::Mask,
-    /// It does not contract with the factors of the step before that it began with: the start
-    /// values are to be set again.
+    /// Whether the iteration must restart from the initial guess: it does not contract with the
+    /// factors of the preceding step.
     pub needs_restart: bool,
-    /// Whether the factors that are there are those of the solution.
+    /// Whether the factors in the workspace are those at the solution.
     pub factors_at_solution: bool,
-    /// An unknown of linear equations that they do not determine, in some lane that has not
-    /// converged for that.
+    /// An unknown that linear equations do not determine, in a lane that did not converge for this
+    /// reason.
     pub undetermined: Option<usize>,
 }
 
-/// What increments are held against.
+/// Tolerances of relative increments.
 #[derive(Clone, Copy)]
 struct Tolerances {
-    /// The increment that is small enough.
+    /// Tolerance of the iteration.
     tolerance: f64,
-    /// The increment that is a rounding error.
+    /// Bound of rounding errors.
     rounding: f64,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Solves the stages of a step from the start values in `y`.
+    /// Solves for the stages of a step from the initial guess in `y`.
     pub(crate) fn newton(
         &mut self,
         equations: StageEquations<'_, M, E, S, F>,
@@ -115,8 +116,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         solved
     }
 
-    /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is
-    /// computed before it is known whether it is needed.
+    /// Iterates until the increment is small enough. Not inlined, so that its `f64` operations are
+    /// not executed before it is known whether they are needed.
     #[inline(never)]
     fn iterate_until_converged(
         &mut self,
@@ -143,13 +144,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         let mut status = Status::default();
         let mut first_residual = E::from_f64(0.0);
         let mut iteration = 0;
-        // Whether nothing is known of an increment before.
+        // Whether there is no last increment to compare with.
         let mut no_previous_increment = true;
-        // Nothing will be written where states are kinematic.
+        // Increments of kinematic states are never written: they remain zero.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         let mut omits_kinematic = self.omits_kinematic(policy.renew);
         loop {
-            // The first iteration of nonlinear equations is far away in any case.
+            // The first iterate of nonlinear equations is too inaccurate for compensation.
             let compensate = options.compensated && (iteration > 0 || linear);
             self.place_iterate(equations, y, omits_kinematic, compensate);
             let checks_residual = policy.may_refresh_early && iteration == 1;
@@ -181,7 +182,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             {
                 return solved;
             }
-            // The first increments of what begins far away may grow.
+            // The first increments may grow if the initial guess is far from the solution.
             if !linear && iteration > 2 && status.stagnates {
                 test.accept_satisfied(self.residual_is_rounding());
                 if !E::any(test.active) {
@@ -219,7 +220,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// Writes what the model is evaluated at.
+    /// Writes the variables at which the model is evaluated.
     #[inline(always)]
     fn place_iterate(
         &mut self,
@@ -241,7 +242,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// The residual, which may be there, and the Jacobian: at all stages, or in their middle.
+    /// Evaluates the Jacobian, at all stages or at their midpoint, and the residual, unless it is
+    /// known.
     #[inline(always)]
     fn evaluate_iterate_jacobian(
         &mut self,
@@ -257,7 +259,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// What the residual has beside the values of the model.
+    /// Adds the terms of kinematic states and of compensation to the residual of the model.
     #[inline(always)]
     fn complete_residual(
         &mut self,
@@ -274,14 +276,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// The largest residual of all stages.
+    /// Returns the largest residual of all stages.
     #[inline(always)]
     fn largest_residual(&self) -> E {
         largest(self.f.as_ref().as_flattened())
     }
 
-    /// The end of linear equations, if their residual says so: one iteration solves them, but for
-    /// digits that were lost.
+    /// Returns the result for linear equations, unless the residual requires a refinement.
     #[inline(always)]
     fn linear_result(
         &mut self,
@@ -296,7 +297,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             return None;
         }
         let mut undetermined = None;
-        // Of old factors it is known already.
+        // Reused factors have been checked already.
         if factored && self.has_small_pivot(x, y) {
             let (determined, unknown) = self.is_determined(coefficients, n, x, y);
             (satisfied, undetermined) = (E::and(satisfied, determined), unknown);
@@ -309,7 +310,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         })
     }
 
-    /// `y ← y − Δ`, and what the convergence test says about the increment.
+    /// `y ← y − Δ`; returns the status of the convergence test, and the growth of the increment.
     #[inline(always)]
     fn apply_increment(
         &mut self,
@@ -363,8 +364,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// So many iterations, whose increments nobody asks for: on a processor without an FPU for
-    /// double precision they take no operation of it.
+    /// Makes `count` iterations without a convergence test: on a processor without double-precision
+    /// FPU they need no `f64` operations.
     fn iterate_fixed(
         &mut self,
         equations: StageEquations<'_, M, E, S, F>,
@@ -377,7 +378,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         let factors_valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
-        // Nothing will be written where states are kinematic.
+        // Increments of kinematic states are never written: they remain zero.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         for iteration in 0..count {
             let omits_kinematic = self.omits_kinematic(!factors_valid);
@@ -407,12 +408,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// Whether stages may share a Jacobian: of one stage or two there is no eigenbasis. A single
-    /// step starts near its solution, where that saves little in small models.
+    /// Whether stages may share a Jacobian: only three stages or more have an eigenbasis. An
+    /// integrator of one step starts near its solution, where a shared Jacobian saves little in
+    /// small models.
     const MAY_SHARE_JACOBIAN: bool =
         S > 2 && F::HAS_MEMORY && (F::INTERVALS || !JacobianPolicy::<M, E, S>::STAGE_FACTORS_ARE_CHEAP);
 
-    /// Factors of the shared Jacobian, if there is memory for them.
+    /// Factorises the shared Jacobian; returns `false` without memory for it.
     #[inline(always)]
     fn factor_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
         if const { Self::MAY_SHARE_JACOBIAN }
@@ -429,7 +431,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         false
     }
 
-    /// Solves with them.
+    /// Solves with the factors of the shared Jacobian; returns `false` without memory for them.
     #[inline(always)]
     fn solve_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
         if const { Self::MAY_SHARE_JACOBIAN }
@@ -441,19 +443,19 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         false
     }
 
-    /// Factors by blocks.
+    /// Factorises with the Jacobian of each stage.
     fn factor_stages(&mut self, coefficients: &Coefficients<E, S>) {
         let (Linearization { jacobian, factors }, h) = (&mut self.linearization, self.inputs.time.step);
         factors.factor_by_plan(jacobian, &coefficients.a, h);
     }
 
-    /// The residual in the slots of the equations.
+    /// Copies the residual to the slots of the equations.
     pub(in crate::irk) fn place_residual(&mut self) {
         let (plan, f) = (F::plan::<M>(), F::Plan::<M>::k(&self.f));
         dispatch(PlaceResidual { plan, f, increment: F::Plan::<M>::k_mut(&mut self.increment) });
     }
 
-    /// After the last iteration: no lane is active any more.
+    /// Returns the result after the last iteration, when no lane is active.
     fn newton_result(&mut self, test: &ConvergenceTest<E>, shared: bool) -> NewtonResult<E> {
         self.validity.rate = test.slowest_rate();
         let any_converged = E::any(test.converged);

@@ -1,11 +1,11 @@
 //! Newton's method on the stages of a step.
 //!
-//! The [`iteration`] finds [increments](increment), whose [`norm`] the test of [`convergence`]
-//! takes; the [policy](jacobian_policy) says which Jacobian they are found with, and increments by
-//! an old one that grow are [rejected](rejection). Where it does not arrive, the
-//! [dense fallback](dense_fallback) pivots the whole matrix; linear equations are asked whether
-//! they are [nearly singular](near_singular), and errors say where the iteration
-//! [started](start_errors), and whether a fold is between.
+//! The [`iteration`] computes [increments](increment), whose [`norm`] is the input of the
+//! [`convergence`] test. The [policy](jacobian_policy) decides about updates of the Jacobian;
+//! increments that grow with an old Jacobian are [rejected](rejection). If the iteration does not
+//! converge, the [dense fallback](dense_fallback) pivots the whole matrix. Linear equations are
+//! checked for being [nearly singular](near_singular). Errors report [start values](start_errors),
+//! and a [`fold`] between start and solution.
 
 mod convergence;
 pub(super) mod dense_fallback;

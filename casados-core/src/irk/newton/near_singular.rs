@@ -1,15 +1,13 @@
-//! Whether linear equations determine their solution, or only the digits that rounding has left of
-//! a matrix that is singular.
+//! Detects nearly singular linear equations, whose solution consists of rounding errors.
 //!
-//! One iteration of Newton's method solves them, and leaves residuals at rounding level however
-//! large the condition of the matrix is. Nonlinear equations that are as bad do not converge; of
-//! linear ones nothing would be seen. A pivot that is small beside the terms of its equation is the
-//! reason to look: an iteration leads from any point to the solution of linear equations, so that
-//! from a few points around it solutions differ by what rounding makes of the residual there, and
-//! are known to the digits that they have in common (stochastic arithmetic: J. Vignes, Math.
-//! Comput. Simul. 35 (1993)). What is looked at are residuals as the model evaluates them: a matrix
-//! may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole
-//! matrix tells.
+//! One iteration of Newton's method solves linear equations, with residuals at rounding level even
+//! if the matrix is nearly singular. (Nonlinear equations do not converge then.) A pivot that is
+//! small relative to the terms of its equation triggers the check: Newton's method is applied to a
+//! few perturbed points. From each of them one iteration leads to the solution, up to the rounding
+//! errors of the residual there, so that the solution is known to the digits that the results have
+//! in common (stochastic arithmetic: J. Vignes, Math. Comput. Simul. 35 (1993)). The residuals are
+//! those of the model, so that stiffness of the matrix is irrelevant. The dense fallback decides
+//! whether the planned elimination is the cause.
 
 use super::increment::subtract_increment;
 use crate::irk::coefficients::Coefficients;
@@ -19,23 +17,23 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 
-/// A pivot is small if what it is divided by this leaves less of the terms of its equation, in
-/// units of rounding: five digits are left.
+/// A pivot is small if rounding errors of the terms of its equation, divided by the pivot, exceed
+/// this fraction of the unknown: fewer than five digits are left.
 const SMALL_PIVOT: f64 = 1.0 / 65536.0;
-/// Points that are tried.
+/// Number of perturbed points.
 const PERTURBED_POINTS: usize = 4;
-/// How far away they are at most, in parts of the unknowns: far enough that nothing is rounded as
-/// it was.
+/// Largest relative perturbation of the unknowns: large enough to change all rounding errors.
 const MAX_PERTURBATION: f64 = 0.5;
-/// Where a state rests its derivative has no digits: a change in a step below this part of the
-/// state counts as one of this size.
+/// Smallest change of a state in a step, relative to the state, for the size of its derivative: in
+/// a steady state the derivative consists of rounding errors.
 const MIN_RELATIVE_CHANGE: f64 = 1.0 / 64.0;
-/// Solutions that differ by this part of themselves are none.
+/// Maximal relative difference between solutions.
 const MAX_SOLUTION_SPREAD: f64 = 1.0 / 32.0;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Whether a pivot is so small beside the terms of its equation, which were just
-    /// [found](Self::is_satisfied), that `y` may be rounding errors.
+    /// Whether a pivot is so small relative to the terms of its equation that `y` may consist of
+    /// rounding errors. The magnitudes of the terms are those of
+    /// [`residual_is_rounding`](Self::residual_is_rounding).
     pub(in crate::irk) fn has_small_pivot(&self, x: &ArrayX<M, E>, y: &ArrayK<M, [E; S]>) -> bool {
         let factors = self.linearization.factors.planned();
         let h = self.inputs.time.step.abs();
@@ -54,7 +52,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
                 continue;
             };
             let amplified = inverse[0][0].abs() * terms[0];
-            // Mostly that is all there is to be asked.
+            // The first stage is sufficient in most cases.
             if E::any(E::lt(bound * y[0].abs(), amplified)) {
                 let unknown_size = unknown_size(y, x.as_ref().get(slot).copied(), h);
                 small = E::or(small, E::lt(bound * unknown_size, amplified));
@@ -63,8 +61,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         E::any(small)
     }
 
-    /// The lanes in which `y` is a solution to more than a digit, and an unknown that is not in the
-    /// others.
+    /// Returns the lanes in which `y` is determined to more than a digit, and an unknown that is
+    /// not determined in one of the others.
     #[cold]
     #[inline(never)]
     pub(in crate::irk) fn is_determined(
@@ -86,7 +84,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             }
             let other = self.newton_iterate(coefficients, step, x, &perturbed);
             for (unknown, (reference, other)) in reference.as_ref().iter().zip(other.as_ref()).enumerate() {
-                // Those of kinematic states are not iterated.
+                // Kinematic states are not iterated.
                 if kinematic::<M>(unknown).is_some() {
                     continue;
                 }
@@ -105,7 +103,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         (good, undetermined)
     }
 
-    /// What an iteration makes of `y`.
+    /// Applies one iteration to `y`.
     fn newton_iterate(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -123,9 +121,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     }
 }
 
-/// The size of an unknown at its stages; of a derivative at least one by which a state changes in a
-/// step by a part of itself, and infinite in an interval without length, in which it changes
-/// nothing. Below normal numbers there are no digits to be lost.
+/// The size of an unknown at its stages. For a derivative at least [`MIN_RELATIVE_CHANGE`] of the
+/// state per step; infinite for a step of length zero, in which it has no effect. Values below the
+/// normal numbers count as their limit.
 fn unknown_size<E: Lanes, const S: usize>(y: &[E; S], x: Option<E>, h: E) -> E {
     let smallest = E::from_f64(E::SMALLEST / E::EPSILON);
     let own = y.iter().fold(smallest, |size, y| y.abs().max(size));

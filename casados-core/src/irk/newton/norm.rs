@@ -1,5 +1,4 @@
-//! How large an increment of Newton's method is, relative to the unknowns, and what that means for
-//! kinematic states.
+//! The norm of increments relative to the unknowns, including the effect on kinematic states.
 
 use crate::irk::kinematic::minus_c;
 use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row};
@@ -7,7 +6,7 @@ use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::Plain;
 
-/// The size of an increment relative to the unknowns as they are now.
+/// The size of an increment relative to the present unknowns.
 pub(in crate::irk) struct MeasureIncrement<'a, M: Plan, E: Plain, const S: usize> {
     pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
@@ -27,9 +26,9 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for MeasureIncrement<'_, M, E, S>
     fn run<A: Arithmetic>(self) -> E {
         let Self { plan, scales, x, y, increment, weights, sizes, h, floor } = self;
         let zero = E::from_f64(0.0);
-        // A change of ẋ below this much of x/h rounds to none in x.
+        // Changes of `ẋ` below this fraction of `x/h` round to zero in `x`.
         let change_per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
-        // Four unknowns side by side, and the rest one by one.
+        // Four unknowns at a time, then the remaining ones.
         let (ys, last_ys) = unknowns_of(plan, y.as_ref()).as_chunks::<4>();
         let (increments, last) = unknowns_of(plan, increment.as_ref()).as_chunks::<4>();
         let (own_weights, last_weights) = unknowns_of_mut(plan, weights.as_mut()).as_chunks_mut::<4>();
@@ -74,16 +73,16 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for MeasureIncrement<'_, M, E, S>
     }
 }
 
-/// What is known of the relative size of the increments of some unknowns, in `N` accumulators.
+/// Relative increments of some unknowns, in `N` accumulators.
 struct RelativeIncrements<E, const N: usize> {
     largest: [E; N],
-    /// What is not a number is not lost in a sum.
+    /// Sum of the increments: it preserves NaN, which a maximum may lose.
     sum: [E; N],
     change_per_step: E,
 }
 
 impl<E: Lanes, const N: usize> RelativeIncrements<E, N> {
-    /// Takes `N` unknowns into account, of which those that are derivatives have these states.
+    /// Includes `N` unknowns; `states` are the states of those that are derivatives.
     #[inline(always)]
     fn include<const S: usize>(
         &mut self,
@@ -105,7 +104,7 @@ impl<E: Lanes, const N: usize> RelativeIncrements<E, N> {
         for scale in &mut scale {
             *scale = (scale.abs() * self.change_per_step).max(smallest);
         }
-        // Stage by stage, so that what is done to unknowns is done to vectors.
+        // The loop over stages is outside, so that operations on the unknowns are vectorised.
         #[allow(clippy::needless_range_loop)]
         for i in 0..S {
             for n in 0..N {
@@ -123,7 +122,7 @@ impl<E: Lanes, const N: usize> RelativeIncrements<E, N> {
         }
     }
 
-    /// The largest, and the sum.
+    /// Returns the largest relative increment, and the sum.
     #[inline(always)]
     fn reduce(&self) -> [E; 2] {
         let (mut largest, mut sum) = (E::from_f64(0.0), E::from_f64(0.0));
@@ -134,7 +133,7 @@ impl<E: Lanes, const N: usize> RelativeIncrements<E, N> {
     }
 }
 
-/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
+/// The bound `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: relevant if `v` is much smaller than its
 /// change within the step.
 struct VelocityIncrements<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
@@ -169,7 +168,7 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for VelocityIncrements<'_, M,
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
         let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
         let bound = self.tableau_norm * minus_c.abs();
-        // At one stage it is large enough nearly always.
+        // The first stage is sufficient in most cases.
         if !E::any(E::lt(*weight * k[0].abs(), bound)) {
             return;
         }
@@ -193,20 +192,21 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for VelocityIncrements<'_, M,
     }
 }
 
-/// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to
-/// half of the largest `Σ_j |a_ij| |Δ_j|` if they have one sign at all stages, and less if not.
+/// Typical ratio of an increment of a kinematic state to its bound: `Σ_j a_ij Δ_j` is up to half of
+/// the largest `Σ_j |a_ij| |Δ_j|` if all stages have the same sign, otherwise less.
 const TYPICAL_KINEMATIC_RATIO: f64 = 0.25;
 
-/// What increments of velocities are measured by too: `k_q` of [kinematic](crate::irk::kinematic)
-/// states.
+/// The sizes `k_q` of [kinematic](crate::irk::kinematic) states, by which increments of velocities
+/// are measured too.
 pub(in crate::irk) struct KinematicScales<'a, M: Plan, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
-    /// Where their `k` are.
+    /// Variables that contain `k_q`.
     pub points: &'a M::V<[E; S]>,
     pub a: &'a [[E; S]; S],
 }
 
-/// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
+/// The part of an array of unknowns without the kinematic states at its ends, which have no
+/// increments.
 #[inline(always)]
 pub(in crate::irk) fn unknowns_of<M: Plan, T>(plan: M, of: &[T]) -> &[T] {
     let (first, end) = plan.facts().non_kinematic_range;
@@ -219,7 +219,7 @@ pub(in crate::irk) fn unknowns_of_mut<M: Plan, T>(plan: M, of: &mut [T]) -> &mut
     of.get_mut(first..end).unwrap_or_default()
 }
 
-/// The largest of two accumulators, or what is not a number.
+/// The larger of two accumulators, or NaN.
 #[inline(always)]
 pub(super) fn larger_accumulator<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
     let total = sum + other;

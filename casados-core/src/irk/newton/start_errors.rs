@@ -1,4 +1,4 @@
-//! What errors say about where Newton's method started.
+//! Start values of Newton's method in errors.
 
 use super::dense_fallback::unknown_name;
 use crate::error::{Error, Started};
@@ -11,29 +11,32 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Values of an algebraic state at which an equation is tried that has none.
+/// Values of an algebraic state that are tried if an equation is undefined at its start value.
 const TRIAL_VALUES: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// The error of the first step, as [`Work::explain_with_start`] says; with a warm start as it is.
-    pub(in crate::irk) fn explain_start(&mut self, error: Error, guess: &InitialGuess<'_, M, T, S>) -> Error {
+    /// Returns the error of the first step as [`explain_with_start`](Self::explain_with_start)
+    /// does; after a warm start it is unchanged.
+    pub(in crate::irk) fn explain_first_step(
+        &mut self,
+        error: Error,
+        guess: &InitialGuess<'_, M, T, S>,
+    ) -> Error {
         let given = self.start_values;
         match guess {
-            InitialGuess::Nominal => {
-                self.explain_with_start(error, &|unknown| M::START.get(unknown).copied())
-            }
+            InitialGuess::Nominal => self.add_start_value(error, &|unknown| M::START.get(unknown).copied()),
             InitialGuess::Given => {
-                self.explain_with_start(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+                self.add_start_value(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
             }
-            InitialGuess::Zero => self.explain_with_start(error, &|_| None),
+            InitialGuess::Zero => self.add_start_value(error, &|_| None),
             InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
         }
     }
 
-    /// The error, with the algebraic state that led to it and its start value, which is zero if
-    /// there is none; of a model without any such state as it is.
+    /// Adds to the error the algebraic state that caused it, and its start value (zero without
+    /// one). Errors of models without algebraic states are returned unchanged.
     #[cold]
-    pub(in crate::irk) fn explain_with_start(
+    pub(in crate::irk) fn add_start_value(
         &mut self,
         error: Error,
         start: &dyn Fn(usize) -> Option<f64>,
@@ -60,7 +63,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         }
     }
 
-    /// The first algebraic state of an equation, as an unknown, of which something holds.
+    /// Returns the first algebraic state of an equation that satisfies the predicate, as an
+    /// unknown.
     fn find_algebraic(equation: usize, predicate: &mut dyn FnMut(usize) -> bool) -> Option<usize> {
         let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
         for entry in begin..end {
@@ -73,8 +77,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         None
     }
 
-    /// The algebraic state for whose value an equation has none: with another one it has. The
-    /// points of the stages are left anywhere.
+    /// Returns the algebraic state at whose value an equation is undefined, while it is defined at
+    /// another one. Overwrites the points of the stages.
     fn find_undefined_state(&mut self, equation: usize) -> Option<usize> {
         Self::find_algebraic(equation, &mut |unknown| {
             let variable = unknown + M::Shape::NX;

@@ -1,4 +1,4 @@
-//! Adjoint sensitivities as users see them.
+//! The public interface to adjoint sensitivities.
 
 use crate::error::{Argument, Error};
 use crate::finite::check_model_input;
@@ -12,8 +12,8 @@ use crate::scalar::Real;
 use crate::shape::Matrix;
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Allocates what `adjoint_many` with `C` seeds needs, so that no call of it will. `adjoint`
-    /// has one.
+    /// Allocates the memory of `adjoint_many` with `C` seeds (`adjoint` has one), so that its calls
+    /// do not allocate.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -25,7 +25,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.reserve()
     }
 
-    /// The solution, and the gradient of `λᵀx₊` with respect to `x₀`, `u` and `p`.
+    /// Returns the solution, and the gradient of `λᵀx₊` with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -42,7 +42,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.solve_adjoint(&Arguments { x0, u, h }, lambda.as_slice(), None)
     }
 
-    /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
+    /// Returns the solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of
+    /// `lambdas`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -72,7 +73,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         reset_integrand(&mut integrand);
         let memory = self.run.invalidate_solution_on_error(W::adjoint(&mut self.adjoint))?;
         let count = self.run.options.steps;
-        // On the way forth only the last step is linearised: it is where the way back begins.
+        // The forward pass linearises only the last step, where the backward pass begins.
         let mut context = self.run.run_steps(arguments, |parts, n, step, exact| {
             if let Some(integrand) = &mut integrand {
                 parts.workspace.add_integrand_value(parts.coefficients, n, step, &mut **integrand)?;

@@ -1,4 +1,4 @@
-//! Forward sensitivities, in all directions or in given ones, as users see them.
+//! The public interface to forward sensitivities, in all or in given directions.
 
 use crate::error::{Argument, Error};
 use crate::finite::check_model_input;
@@ -16,7 +16,7 @@ use crate::shape::Matrix;
 use crate::statistics::Statistics;
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Allocates what `forward` needs, so that no call of it will.
+    /// Allocates the memory of `forward`, so that its calls do not allocate.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -28,7 +28,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.reserve()
     }
 
-    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`.
+    /// Returns the solution, and its derivatives with respect to `x₀`, `u` and `p`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -40,7 +40,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.commit_forward()
     }
 
-    /// [`Integrator::forward`] into a result elsewhere, which is no result if there is an error.
+    /// [`Integrator::forward`] with a result of the caller, which is invalid after an error.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_to(
         &mut self,
@@ -54,8 +54,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.commit_forward().map(|_| ())
     }
 
-    /// As [`Integrator::forward`], with an integrand, and with derivatives refined where digits
-    /// were lost.
+    /// [`Integrator::forward`] with an integrand, and with refinement of derivatives that lost
+    /// digits.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_refined(
         &mut self,
@@ -71,8 +71,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.commit_forward()
     }
 
-    /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the
-    /// derivatives.
+    /// Returns the solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with
+    /// the derivatives.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -94,7 +94,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::forward(&mut self.forward)?.result)
     }
 
-    /// [`Integrator::forward_adjoint`] into a result elsewhere, which is no result if there is an
+    /// [`Integrator::forward_adjoint`] with a result of the caller, which is invalid after an
     /// error.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_adjoint_to(
@@ -112,8 +112,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.commit_forward().map(|_| ())
     }
 
-    /// Derivatives, written to the memory of `forward` or elsewhere. Not optimised once more with
-    /// each of those that call it.
+    /// Computes derivatives, into the memory of `forward` or of the caller. Not inlined, so that it
+    /// is optimised once.
     #[cfg_attr(feature = "std", inline(never))]
     pub(in crate::irk) fn differentiate<const REFINED: bool>(
         &mut self,
@@ -143,7 +143,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         finish_integrand(&mut integrand)
     }
 
-    /// After a successful call, whose stages and their derivatives are kept.
+    /// Commits a successful call, with its steps and the stage derivatives.
     pub(in crate::irk) fn commit_forward(&mut self) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
@@ -153,8 +153,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::forward(&mut self.forward)?.result.forward)
     }
 
-    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
-    /// for each direction.
+    /// Returns the derivatives of `Σ_i weight_i k_i` of the last step after
+    /// [`Integrator::forward`], one row per direction.
     ///
     /// # Errors
     /// [`Error::NoResult`]
@@ -172,14 +172,14 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last
+    /// Returns the solution at the time `t` (time of the model) inside the interval of the last
     /// successful call, and its derivatives with respect to `x₀`, `u` and `p`.
     ///
-    /// The stages of that call are differentiated step by step up to the one that contains the
-    /// time; times in the same step or a later one go on from there.
+    /// The steps of that call are differentiated up to the one that contains `t`; a following call
+    /// with a time in the same step or a later one continues from there.
     ///
     /// # Errors
-    /// Those of [`Integrator::dense`], and of [`Integrator::forward`].
+    /// Those of [`Integrator::dense`] and [`Integrator::forward`].
     pub fn dense_forward(&mut self, t: T) -> Result<&DenseForward<M, T>, Error>
     where
         W: WithForward,
@@ -189,17 +189,17 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let point =
             StepPoint::new(t, &last.workspace.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
         let differentiated = self.differentiated_step.take().filter(|done| *done <= point.step);
-        // Those of the last call stay what they are.
+        // The statistics of the last call remain unchanged.
         let mut statistics = Statistics::default();
         let mut context = CallContext { statistics: &mut statistics, ..last };
         context.workspace.inputs = context.workspace.last_inputs;
-        // Factors that are there may be those of a call that failed.
+        // The factors in the workspace may belong to a failed call.
         context.workspace.begin_call();
         let first = differentiated.map_or(0, |done| done + 1);
         for (n, step) in context.steps.iter().enumerate().take(point.step + 1).skip(first) {
             context.linearize(n, step, false)?;
             let ForwardMemory { result, pass, .. } = &mut *forward;
-            // None of them is the last one: there is a result already.
+            // No step counts as the last, since the result exists already.
             let at = StepIndex { n, count: usize::MAX, prefetch_output: false };
             pass.step::<_, false>(&mut context, at, None, &mut result.forward)?;
         }
@@ -214,7 +214,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
 }
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Allocates what `directional` with `C` directions needs, so that no call of it will.
+    /// Allocates the memory of `directional` with `C` directions, so that its calls do not
+    /// allocate.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -226,7 +227,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.reserve()
     }
 
-    /// The solution, and its derivatives in `C` directions.
+    /// Returns the solution, and its derivatives in `C` directions.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -259,7 +260,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&memory.result)
     }
 
-    /// The derivatives of the stages of every step in one direction, added to what is there.
+    /// Adds the derivatives of the stages of every step in one direction to `to`.
     #[cfg(feature = "alloc")]
     pub(crate) fn add_stage_derivatives(
         &mut self,

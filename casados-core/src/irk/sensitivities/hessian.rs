@@ -1,4 +1,4 @@
-//! Second-order sensitivities as users see them.
+//! The public interface to second-order sensitivities.
 
 use crate::error::{Argument, Error};
 use crate::finite::check_model_input;
@@ -14,7 +14,7 @@ use crate::scalar::Real;
 use crate::shape::Matrix;
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Allocates what `hessian` needs, so that no call of it will.
+    /// Allocates the memory of `hessian`, so that its calls do not allocate.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -27,7 +27,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.reserve_forward()
     }
 
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊`, in one pass.
+    /// Returns the solution, its derivatives, and the gradient and the Hessian of `λᵀx₊`.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -44,12 +44,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.hessian_with_quadrature(x0, u, h, lambda, &[], None)
     }
 
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the
-    /// algebraic states `z₀` at the start of the interval, which are
-    /// [`z0`](crate::result::Nominal::z0) of the results: in the same pass.
+    /// Returns the solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`,
+    /// where `z₀` are the algebraic states at the start of the interval,
+    /// [`z0`](crate::result::Nominal::z0) of the results. It takes the same single pass as
+    /// [`hessian`](Self::hessian).
     ///
-    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on
-    /// algebraic states.
+    /// `νᵀ∂²z₀/∂(x₀, u, p)²` enters the Hessian of a Lagrangian whose costs or constraints depend
+    /// on algebraic states.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -77,8 +78,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.hessian_with_quadrature(x0, u, h, lambda, nu.as_slice(), None)
     }
 
-    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an
-    /// integrand.
+    /// [`Integrator::hessian`] with an integrand, and with weights of `z₀` unless `nu` is empty.
     pub(crate) fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
@@ -95,8 +95,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::hessian(&mut self.hessian)?.result)
     }
 
-    /// The same, written to the memory of `hessian` or elsewhere, where there is no result if there
-    /// is an error.
+    /// The same with a result in the memory of `hessian` or of the caller, which is invalid after
+    /// an error.
     pub(crate) fn hessian_to(
         &mut self,
         arguments: &Arguments<'_, M, T>,
@@ -127,7 +127,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if let Some(integrand) = &mut integrand {
                 parts.add_integrand_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
-            // That of the last step is still there on the way back.
+            // The backward pass finds the linearisation of the last step in the workspace.
             if n + 1 < count {
                 kept.store_linearization(parts.workspace);
             }

@@ -1,4 +1,4 @@
-//! Derivatives of a call, as users see them.
+//! The public interface to derivatives.
 
 mod adjoint;
 mod forward;

@@ -1,19 +1,21 @@
-//! Sums of long runs: what a step rounds comes back in every step, and an orbit that returns to the
-//! same points collects the same errors. With [`Options::compensated`](crate::Options::compensated)
-//! four things are therefore not rounded to the digits of `x`:
+//! Compensated sums for long runs: rounding errors of single steps accumulate, with the same errors
+//! at the same points of a periodic orbit. With
+//! [`Options::compensated`](crate::Options::compensated) four quantities are therefore computed
+//! with more digits than those of `x`:
 //!
-//! - `x` carries what was rounded off from it (E. Hairer, R. I. McLachlan, A. Razakarivony,
-//!   "Achieving Brouwer's law with implicit Runge-Kutta methods", BIT 48, 2008), and the change of
-//!   a step, `h Σ_i b_i k_i`, has twice the digits;
-//! - so have the sums of the stages, `ξ_i + δ_i = x + h Σ_j a_ij k_j`. The model sees `ξ_i`, and
-//!   `f_x δ_i` is added to its residual: the Jacobian of any iteration is good enough for that;
-//! - coefficients of a method that keeps quadratic invariants are those of a method that does so to
-//!   twice the digits, `b_i a_ij + b_j a_ji = b_i b_j`: a symplectic method whose order conditions
-//!   hold to rounding has no drift, one that is symplectic to rounding only has one that grows with
-//!   every step.
+//! - `x` itself, by a compensation (E. Hairer, R. I. McLachlan, A. Razakarivony, "Achieving
+//!   Brouwer's law with implicit Runge-Kutta methods", BIT 48, 2008), and the change of a step,
+//!   `h Σ_i b_i k_i`, to twice the digits;
+//! - the sums of the stages, `ξ_i + δ_i = x + h Σ_j a_ij k_j`: the model is evaluated at `ξ_i`, and
+//!   `f_x δ_i` is added to its residual, for which the Jacobian of any iteration is accurate
+//!   enough;
+//! - the coefficients of symplectic methods, corrected so that `b_i a_ij + b_j a_ji = b_i b_j`
+//!   holds to twice the digits. A method that is symplectic, with order conditions that hold to
+//!   rounding, has no drift of quadratic invariants; a method that is symplectic to rounding only
+//!   has a drift that grows with every step.
 //!
-//! What is left is the rounding of the model itself. Products are exact where the machine
-//! multiplies and adds in one instruction; elsewhere only sums are compensated.
+//! The rounding errors of the model remain. Products are exact on machines with a fused
+//! multiply-add instruction; on others only sums are compensated.
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
@@ -26,7 +28,8 @@ use crate::scalar::{Field, Lanes, two_sum};
 use crate::shape::Shape;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Writes `ξ_i`, and keeps `δ_i`, for [`correct_residual`](Self::correct_residual).
+    /// Writes `ξ_i` to the points, and stores `δ_i` for
+    /// [`correct_residual`](Self::correct_residual).
     pub(crate) fn place_compensated(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -48,7 +51,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         });
     }
 
-    /// `f ← f + f_x δ`, with the Jacobian that is there.
+    /// `f ← f + f_x δ`, with the available Jacobian.
     pub(crate) fn correct_residual(&mut self) {
         let (begin, end) = (M::Shape::NX, 2 * M::Shape::NX);
         let (jacobian, [beyond, _]) = (self.linearization.jacobian.as_ref(), &self.variable_scratch);
@@ -95,7 +98,7 @@ impl<E: Field, const S: usize> Kernel for PlaceCompensated<'_, E, S> {
     }
 }
 
-/// What `A` needs beyond its digits for `b_i a_ij + b_j a_ji = b_i b_j`.
+/// The correction of `A` beyond its digits for `b_i a_ij + b_j a_ji = b_i b_j`.
 #[inline(always)]
 fn symplectic_correction<A: Arithmetic, E: Field, const S: usize>(
     a: &[[E; S]; S],
@@ -118,7 +121,7 @@ fn symplectic_correction<A: Arithmetic, E: Field, const S: usize>(
 }
 
 kernels! {
-    /// `x + e ← x + e + h Σ_i b_i k_i`, where the compensation `e` is less than `x` has digits for.
+    /// `x + e ← x + e + h Σ_i b_i k_i`, with the compensation `e` below the last digit of `x`.
     pub(in crate::irk) fn advance [E: Field, const S: usize] [E, S] <A>(
         x: &'k mut [E],
         compensation: &'k mut [E],

@@ -1,7 +1,8 @@
-//! The model at the stages of a step.
+//! Evaluation of the model at the stages of a step.
 //!
-//! Every variable, equation and entry of the Jacobian has its values at all stages side by side:
-//! where the machine has registers of that many numbers, one call of the model computes them all.
+//! The values of a variable, an equation or an entry of the Jacobian at all stages are adjacent in
+//! memory. On machines with registers of as many numbers, one call of the model evaluates all
+//! stages.
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::stage_values;
@@ -16,7 +17,7 @@ use crate::scalar::{Lanes, SideBySide, Strided};
 use crate::shape::{Matrix, Plain, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Writes `u` and `p`, which are the same at all points of an interval.
+    /// Writes `u` and `p`, which are constant in an interval.
     pub(crate) fn place_inputs(&mut self) {
         let u = 2 * M::Shape::NX + M::Shape::NZ;
         let inputs = self.inputs.u.as_slice().iter().chain(self.inputs.p.as_slice());
@@ -37,8 +38,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         self.dispatch_place::<false>(coefficients, step, x, y);
     }
 
-    /// The same, with the `k_i` of [kinematic](crate::irk::kinematic) states as they follow from
-    /// others, whatever is in their places.
+    /// Like [`place_stages`](Self::place_stages), with the `k_i` of
+    /// [kinematic](crate::irk::kinematic) states computed from their velocities.
     #[inline]
     pub(crate) fn place_unknowns(
         &mut self,
@@ -74,20 +75,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         });
     }
 
-    /// The residual at all stages.
+    /// Evaluates the residual at all stages.
     pub(crate) fn evaluate_residual(&mut self) {
         self.evaluate::<false>();
     }
 
-    /// The residual and the Jacobian at all stages.
+    /// Evaluates the residual and the Jacobian at all stages.
     pub(crate) fn evaluate_jacobian(&mut self) {
         self.evaluate::<true>();
         self.replicate_jacobian();
     }
 
-    /// The residual at all stages, which may be there, and one Jacobian for all of them: that in
-    /// their middle. Of a single lane it is that of each, as its stages are evaluated side by side
-    /// where a machine can: the mean of those is taken.
+    /// Evaluates one Jacobian for all stages, and the residual at each stage. With one lane the
+    /// Jacobians of all stages are evaluated, in one SIMD register if possible, and averaged in the
+    /// factorisation. With several lanes the Jacobian at the midpoint of the stages is evaluated.
+    /// `residual` is whether the residual is known.
     pub(crate) fn evaluate_midpoint_jacobian(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -114,7 +116,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// The Jacobian at all stages, if it is there for the first one only.
+    /// Copies the Jacobian of the first stage to all stages, if only that was evaluated.
     pub(crate) fn replicate_jacobian(&mut self) {
         if core::mem::take(&mut self.first_stage_only) {
             spread(self.linearization.jacobian.as_mut());
@@ -123,7 +125,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
 
     #[inline(always)]
     fn evaluate<const JACOBIAN: bool>(&mut self) {
-        // Of stages that are all alike one is evaluated.
+        // Identical stages are evaluated once.
         let alike = core::mem::take(&mut self.identical_stages);
         let Self { points, f, linearization: linear, first_stage_only: first_only, .. } = self;
         if JACOBIAN {
@@ -141,7 +143,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         }
     }
 
-    /// The residual, and the Jacobian if it is asked for, at a stage.
+    /// Evaluates the residual, and with `JACOBIAN` the Jacobian, at a stage.
     #[inline(always)]
     fn evaluate_stage<const JACOBIAN: bool>(&mut self, i: usize) {
         let Self { points, f, linearization: linear, .. } = self;
@@ -155,8 +157,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
 }
 
 kernels! {
-    /// The mean of the stages in place of the first one. (Inputs, which follow so many variables,
-    /// are the same at all of them.)
+    /// Writes the mean of the stages to the first stage. (The variables from `inputs` on, except
+    /// the time, are equal at all stages.)
     fn to_middle [E: Lanes, const S: usize] [E, S] <A>(points: &'k mut [[E; S]], inputs: usize) {
         let (own, rest) = points.split_at_mut(inputs.min(points.len()));
         let stage_weight = E::from_f64(const { 1.0 / S as f64 });
@@ -171,7 +173,7 @@ kernels! {
 }
 
 kernels! {
-    /// What was computed at the first stage, for all of them.
+    /// Copies the values of the first stage to all stages.
     fn spread [E: Lanes, const S: usize] [E, S] <A>(cells: &'k mut [[E; S]]) {
         for cell in cells {
             *cell = [cell[0]; S];
@@ -179,7 +181,7 @@ kernels! {
     }
 }
 
-/// `f`, and its Jacobian if it is asked for, at all stages in one call.
+/// Evaluates `f`, and with `JACOBIAN` its Jacobian, at all stages in one call.
 struct Evaluate<'a, M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> {
     points: &'a StageArray<ArrayV<M, [E; S]>, E, S>,
     f: &'a mut StageArray<ArrayK<M, [E; S]>, E, S>,
@@ -199,7 +201,7 @@ impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
     }
 }
 
-/// See [`Work::place`] and [`Work::place_unknowns`].
+/// See [`StageWorkspace::place_stages`] and [`StageWorkspace::place_unknowns`].
 struct PlaceStages<'a, M: Plan, E: Plain, const S: usize, const UNKNOWNS: bool> {
     plan: M,
     points: &'a mut M::V<[E; S]>,
@@ -230,8 +232,7 @@ impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for PlaceSt
             return;
         }
         let minus_ha = minus_ha(a, h);
-        // Of kinematic states, which are most often the first or the last, there is nothing to
-        // copy.
+        // Kinematic states, mostly the first or the last unknowns, are not copied.
         let (first, end) = if UNKNOWNS { plan.facts().non_kinematic_range } else { (0, y.len()) };
         let states = first..nx.min(end).max(first);
         let (xdot, rest) = points.split_at_mut(nx);
@@ -253,7 +254,7 @@ impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for PlaceSt
     }
 }
 
-/// Kinematic states and their derivatives, once their velocities are there.
+/// Computes kinematic states and their derivatives from their velocities.
 struct Reconstruct<'a, M, E, const S: usize> {
     plan: M,
     points: &'a mut [[E; S]],

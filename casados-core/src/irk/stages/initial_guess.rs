@@ -1,4 +1,4 @@
-//! Where Newton's method starts: the unknowns of the stages before its first iteration.
+//! The initial guess of Newton's method: the unknowns of the stages before the first iteration.
 
 use crate::irk::coefficients::{Coefficients, stage_values};
 use crate::irk::workspace::{StageWorkspace, Step};
@@ -8,20 +8,20 @@ use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Shape, copy_into};
 
-/// Where the unknowns of the stages start.
+/// The initial guess of the unknowns of the stages.
 pub(crate) enum InitialGuess<'a, M: Dae, E: Lanes, const S: usize> {
-    /// At the start values of the model.
+    /// The nominal values of the model.
     Nominal,
     Zero,
     Given,
     Previous(&'a [Step<M, E, S>]),
-    /// These are solutions.
+    /// Stages that are a solution.
     Solution(&'a [Step<M, E, S>]),
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step
-    /// before, continued, or if that is not worth much its algebraic states.
+    /// Sets the initial guess of step `n`. After the first step it extrapolates the preceding step;
+    /// without extrapolation polynomials it copies the algebraic states of the preceding step.
     pub(crate) fn set_initial_guess(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -64,7 +64,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     }
 }
 
-/// Algebraic states as at the last stage of the step before: on its branch.
+/// Copies the algebraic states of the last stage of the preceding step, which are on the same
+/// branch.
 pub(in crate::irk) fn copy_algebraic_states<M: Dae, E: Lanes, const S: usize>(
     previous: Option<&Step<M, E, S>>,
     y: &mut ArrayK<M, [E; S]>,
@@ -77,7 +78,7 @@ pub(in crate::irk) fn copy_algebraic_states<M: Dae, E: Lanes, const S: usize>(
     }
 }
 
-/// Whether every `ẋ` starts at zero: then states are the same at all stages.
+/// Whether every `ẋ` starts at zero, so that the stages are identical.
 const fn starts_at_rest<M: Dae>() -> bool {
     let mut unknown = 0;
     while unknown < M::Shape::NX && unknown < M::START.len() {
@@ -90,13 +91,14 @@ const fn starts_at_rest<M: Dae>() -> bool {
 }
 
 kernels! {
-    /// The polynomial through the stages at those of the next step.
+    /// Evaluates the polynomial through the stages at the stages of the next step.
     fn extrapolate [E: Field, const S: usize] [E, S] <A>(
         from: &'k [[E; S]],
         next: &'k [[E; S]; S],
         to: &'k mut [[E; S]],
     ) {
-        // The Lagrange polynomials are to these values what `hA` is to derivatives.
+        // The matrix of Lagrange polynomials multiplies the stage values as `hA` multiplies
+        // derivatives.
         let minus_next = minus_ha(next, E::from_f64(1.0));
         for (to, from) in to.iter_mut().zip(from) {
             *to = stage_values::<A, E, S>(E::from_f64(0.0), &minus_next, from);

@@ -1,5 +1,5 @@
-//! The stages of a step: the [initial guess](initial_guess), the [model at them](evaluate), and
-//! [sums](compensated) that do not round.
+//! The stages of a step: the [initial guess](initial_guess), the [evaluation](evaluate) of the
+//! model, and [compensated sums](compensated).
 
 pub(super) mod compensated;
 pub(super) mod evaluate;

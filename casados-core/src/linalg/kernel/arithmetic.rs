@@ -1,21 +1,21 @@
-//! What kernels multiply and subtract with: rounded twice, or once where a machine has the
+//! The multiply-subtract operation of kernels: rounded twice, or fused on machines with the
 //! instruction.
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use crate::scalar::Known;
 use crate::scalar::{Field, transposed};
 
-/// An s×s matrix, column after column.
+/// An s×s matrix in column-major order.
 pub type Block<E, const S: usize> = [[E; S]; S];
 
-/// How `t − a b` is computed.
+/// Implementation of `t − a b`.
 pub trait Arithmetic {
-    /// Whether it rounds once.
+    /// Whether it is rounded once.
     const FUSED: bool = false;
-    /// Whether short loops over tables become straight lines. Registers take so long for a block
-    /// that it matters little how its place is found.
+    /// Whether short loops over tables are unrolled. Operations on blocks of SIMD registers take so
+    /// long that address computations do not matter.
     const UNROLLED: bool = false;
-    /// Whether numbers side by side fill the registers of AVX-512.
+    /// Whether adjacent numbers fill AVX-512 registers.
     const WIDE: bool = false;
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
@@ -51,18 +51,18 @@ pub trait Arithmetic {
             *target = Self::subtract(*target, factor, element);
         }
     }
-    /// `target = block`, in as few instructions as the numbers will be read in: until all that it
-    /// wants has arrived in the nearest cache, a wider one would wait.
+    /// `target = block`, with stores as wide as the following loads: a wider load would wait until
+    /// all of its stores have reached the L1 cache.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
         *target = *block;
     }
-    /// Rows as columns.
+    /// The transposed matrix.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
         transposed(rows)
     }
-    /// `target − a b`, element by element
+    /// `target − a b`, element by element.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
@@ -71,7 +71,7 @@ pub trait Arithmetic {
     }
 }
 
-/// Rounded twice.
+/// `t − a b` rounded twice.
 pub struct Unfused;
 
 impl Arithmetic for Unfused {
@@ -81,9 +81,9 @@ impl Arithmetic for Unfused {
     }
 }
 
-/// Rounded once, in one instruction. Kernels are run with it by [`dispatch`] alone, where the
-/// machine has the instructions; so it says that these are [`Known`]. On numbers side by side in
-/// registers as `WIDE` as those of AVX-512 are, or half as wide; with loops `UNROLLED` or not.
+/// `t − a b` rounded once, in one instruction. Only [`dispatch`](super::dispatch::dispatch) runs
+/// kernels with it, on machines with the instructions; they are therefore [`Known`]. `WIDE`: with
+/// AVX-512 registers, otherwise half as wide. `UNROLLED`: with unrolled loops.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub struct Fused<const WIDE: bool, const UNROLLED: bool>;
 

@@ -1,9 +1,9 @@
-//! Kernels compiled for every machine, and for those that multiply and add in one instruction:
-//! AVX2, AVX-512.
+//! Kernels that are compiled for the baseline instruction set, and for fused multiply-add with AVX2
+//! and AVX-512.
 //!
 //! A plain x86-64 binary must run on machines without AVX2 and FMA. So a kernel is generic over its
 //! [`Arithmetic`], everything in it is inlined, and [`dispatch`] enters it through a function that
-//! is compiled for the better machine if this is one. Results differ by rounding only.
+//! is compiled for the instruction set of the machine. Results differ by rounding only.
 
 use super::arithmetic::Arithmetic;
 #[cfg(target_arch = "aarch64")]
@@ -14,24 +14,24 @@ use crate::scalar::lanes::{Level, level, may_be_available};
 #[cfg(target_arch = "x86_64")]
 use core::{marker::PhantomData, mem::ManuallyDrop};
 
-/// A computation that is worth being compiled for the machine it runs on.
+/// A computation that is compiled for several instruction sets.
 pub trait Kernel {
-    /// What it computes with.
+    /// The number type of the kernel.
     type Number;
     /// Its result.
     type Output;
-    /// Whether it is long, and its products of numbers fill registers of AVX-512. That takes fewer
-    /// instructions there, and one more copy of the kernel to compile. Loops over tables stay loops
-    /// in it: each step is so long that it matters little how its place is found.
+    /// Whether the kernel is long and its products of numbers fill AVX-512 registers. It then takes
+    /// fewer instructions on such machines, with one more copy to compile. Its loops over tables
+    /// are not unrolled: each step is so long that address computations do not matter.
     #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
     const WIDE: bool = false;
-    /// To be `#[inline(always)]`, with everything that it calls.
+    /// Runs the kernel; `#[inline(always)]`, with everything that it calls.
     fn run<A: Arithmetic>(self) -> Self::Output;
 }
 
-/// Functions that are kernels: `fn name [generics] [their names] <A>(arguments) { … }`, with the
-/// lifetime `'k`, numbers `E` and the arithmetic `A`. What runs them is [`dispatch`], or said
-/// before them: `by run;`.
+/// Defines functions that are kernels: `fn name [generics] [their names] <A>(arguments) { … }`,
+/// with the lifetime `'k`, numbers `E` and the arithmetic `A`. They are run by [`dispatch`], or by
+/// the function named in front of them: `by run;`.
 macro_rules! kernels {
     (by $run:path; $(
         $(#[$meta:meta])*
@@ -63,19 +63,19 @@ macro_rules! kernels {
 }
 pub(crate) use kernels;
 
-/// Runs a kernel on registers as [`dispatch`] does, and one on single numbers as all code around it
-/// is compiled: where that is more than kernels could save.
+/// Runs a kernel on SIMD registers by [`dispatch`], and one on scalars as ordinary code, if
+/// dispatching would cost more than it saves.
 #[inline(always)]
 pub fn run_plain<K: Kernel>(kernel: K) -> K::Output {
     if const { align_of::<K::Number>() < 32 } { kernel.run::<Unfused>() } else { dispatch(kernel) }
 }
 
-/// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
-/// side by side.
+/// Entry functions for each instruction set. Each has its own module, since the compiler processes
+/// modules in parallel.
 ///
-/// Those with instructions that not every machine has find the kernel where it was made: it is made
-/// of pointers, one after the other, and a copy would be made of two at a time, which the processor
-/// waits for until both have arrived in the nearest cache.
+/// Kernels are passed by reference to functions with optional instructions. A kernel consists of
+/// adjacent pointers: a copy would load two of them at a time, and wait until both stores have
+/// reached the L1 cache.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod compiled {
@@ -83,14 +83,14 @@ mod compiled {
         use super::super::{Kernel, Unfused};
         use core::mem::ManuallyDrop;
 
-        // Never inlined beside others, so that callers are small. Where it is the only one, the
-        // optimiser is to see from outside that nothing in it panics.
+        // Not inlined if there are other entry functions, so that callers are small. If it is the
+        // only one it is inlined, so that the optimiser sees that it does not panic.
         /// # Safety
-        /// Nobody else may take the kernel.
+        /// The caller must not use the kernel afterwards.
         #[cfg_attr(feature = "std", inline(never))]
         #[cfg_attr(not(feature = "std"), inline(always))]
         pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
-            // SAFETY: the caller's promise; and nobody drops it.
+            // SAFETY: the kernel is taken once, by the caller's promise, and never dropped.
             unsafe { ManuallyDrop::take(kernel) }.run::<Unfused>()
         }
     }
@@ -101,10 +101,10 @@ mod compiled {
         use core::mem::ManuallyDrop;
 
         /// # Safety
-        /// Nobody else may take the kernel.
+        /// The caller must not use the kernel afterwards, and the machine must have AVX2 and FMA.
         #[target_feature(enable = "avx2,fma")]
         pub unsafe fn run<K: Kernel, const UNROLLED: bool>(kernel: &mut ManuallyDrop<K>) -> K::Output {
-            // SAFETY: the caller's promise; and nobody drops it.
+            // SAFETY: the kernel is taken once, by the caller's promise, and never dropped.
             unsafe { ManuallyDrop::take(kernel) }.run::<Fused<false, UNROLLED>>()
         }
     }
@@ -115,29 +115,29 @@ mod compiled {
         use core::mem::ManuallyDrop;
 
         /// # Safety
-        /// Nobody else may take the kernel.
+        /// The caller must not use the kernel afterwards, and the machine must have AVX-512.
         #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
         pub unsafe fn run<K: Kernel, const UNROLLED: bool>(kernel: &mut ManuallyDrop<K>) -> K::Output {
-            // SAFETY: the caller's promise; and nobody drops it.
+            // SAFETY: the kernel is taken once, by the caller's promise, and never dropped.
             unsafe { ManuallyDrop::take(kernel) }.run::<Fused<true, UNROLLED>>()
         }
     }
 }
 
-/// The functions by which a kernel is entered: those that are for its numbers and for machines that
-/// may run the program. They are constants, so that the compiler looks into no others: of functions
-/// behind `if const` it looks into all.
+/// The entry functions of a kernel: those that suit its numbers and the machines that may run the
+/// program. They are constants, so that the compiler analyses these only: it analyses every
+/// function behind `if const`.
 #[cfg(target_arch = "x86_64")]
 struct EntryPoints<K>(PhantomData<K>);
 
-/// It takes the kernel, which nobody may do after it.
+/// Takes the kernel, which must not be used afterwards.
 #[cfg(target_arch = "x86_64")]
 type EntryPoint<K> = unsafe fn(&mut ManuallyDrop<K>) -> <K as Kernel>::Output;
 
 #[cfg(target_arch = "x86_64")]
 impl<K: Kernel> EntryPoints<K> {
-    /// Whether its numbers are single, and fast. Unoptimised programs, where each copy of a kernel
-    /// is much to compile and none is fast, have the one copy that runs everywhere.
+    /// Whether its numbers are scalars in an optimised program. Unoptimised programs contain only
+    /// the copy that runs everywhere, since each copy costs compile time and none is fast.
     const ARE_FAST_SCALARS: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
     const IN_AVX512: EntryPoint<K> =
         if K::WIDE { compiled::avx512::run::<K, false> } else { compiled::avx512::run::<K, true> };
@@ -157,35 +157,35 @@ impl<K: Kernel> EntryPoints<K> {
     } else {
         None
     };
-    /// Where the machine has neither, or the kernel. Numbers that are registers, which are aligned
-    /// to themselves, need what these are made of. Where the build names more than every machine
-    /// has, nobody gets here.
+    /// The entry for machines, or kernels, without these instruction sets. Kernels on SIMD
+    /// registers, which are aligned to their size, need the instruction set of the register. If the
+    /// build requires more than the baseline, it is the entry for the required instruction set.
     const FALLBACK: EntryPoint<K> = match (align_of::<K::Number>(), Self::AVX2_ENTRY, Self::AVX512_ENTRY) {
         (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be_available(Level::Base) => run,
         (0..32, ..) => compiled::base::run::<K>,
         (32, ..) => Self::IN_AVX2,
         _ => Self::IN_AVX512,
     };
-    /// Whether that is always so, and nothing is to be asked: also of unoptimised programs, where
-    /// nobody else would find out.
+    /// Whether this is the only entry, so that no detection is needed; also in unoptimised
+    /// programs.
     const FALLBACK_ONLY: bool = Self::AVX2_ENTRY.is_none() && Self::AVX512_ENTRY.is_none();
 }
 
-/// Runs a kernel as this machine does it best.
+/// Runs a kernel with the best instruction set of this machine.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    // One of those that follow takes it, and nobody after that.
+    // One of the following entries takes the kernel; it is not used afterwards.
     let mut kernel = ManuallyDrop::new(kernel);
     if const { EntryPoints::<K>::FALLBACK_ONLY } {
-        // SAFETY: as at the end.
+        // SAFETY: as at the end of the function.
         return unsafe { EntryPoints::<K>::FALLBACK(&mut kernel) };
     }
     if let Some(run) = EntryPoints::<K>::AVX512_ENTRY
         && level() == Level::Avx512
     {
-        // SAFETY: `level` says what the machine has.
+        // SAFETY: `level` detects the instruction sets of the machine.
         return unsafe { run(&mut kernel) };
     }
     if let Some(run) = EntryPoints::<K>::AVX2_ENTRY
@@ -194,23 +194,21 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         // SAFETY: as above.
         return unsafe { run(&mut kernel) };
     }
-    // SAFETY: the other condition of calling a function with target features is that the machine
-    // has them. Single numbers need none here. Numbers are `Real`, registers, or made of such, and
-    // no type of a user's can be any of these (`Lanes` is sealed). So what is aligned more is made
-    // of registers of AVX2 or AVX-512, with which drivers compute only after detection; see the
-    // head of `lanes`.
+    // SAFETY: the kernel is not used afterwards, and the machine has the required target features.
+    // Kernels on scalars need none. Numbers are `Real`, SIMD registers, or composed of these;
+    // user-defined types are not possible (`Lanes` is sealed). A larger alignment therefore means
+    // AVX2 or AVX-512 registers, which drivers use only after detection; see the head of `lanes`.
     unsafe { EntryPoints::<K>::FALLBACK(&mut kernel) }
 }
 
-/// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one
-/// instruction.
+/// Runs a kernel: every 64-bit Arm processor has a fused multiply-add instruction.
 #[cfg(target_arch = "aarch64")]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     if const { K::WIDE } { kernel.run::<Fused<false, false>>() } else { kernel.run::<Fused<false, true>>() }
 }
 
-/// Runs a kernel in the way that every machine has.
+/// Runs a kernel with the baseline instruction set.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {

@@ -1,9 +1,9 @@
-//! Sums with twice the digits, as a number and what rounding left of it (T. J. Dekker; D. Knuth).
+//! Double-double sums: a number and its rounding error (T. J. Dekker; D. Knuth).
 
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::scalar::{Field, two_sum};
 
-/// `a b`, rounded, and what rounding left of it; zero where the machine cannot tell.
+/// Returns `a b`, rounded, and its rounding error; zero on machines without fused multiply-add.
 #[inline(always)]
 pub fn two_product<A: Arithmetic, E: Field>(a: E, b: E) -> [E; 2] {
     let product = a * b;

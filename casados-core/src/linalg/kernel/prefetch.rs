@@ -1,11 +1,11 @@
-//! Memory that will be written, fetched while something else is computed.
+//! Prefetching of memory that will be written.
 #![allow(unsafe_code)]
 
-/// Memory that is far away, whose lines are asked for one after the other.
+/// Memory that may be in no cache, prefetched line by line.
 pub struct Prefetch<'a, T>(pub &'a [T]);
 
 impl<T> Prefetch<'_, T> {
-    /// Asks for the next line. Of numbers that are registers themselves nothing is asked for.
+    /// Prefetches the next line; does nothing for SIMD registers.
     #[inline(always)]
     pub fn prefetch_line(&mut self) {
         if const { size_of::<T>() <= 8 }
@@ -14,8 +14,7 @@ impl<T> Prefetch<'_, T> {
             #[cfg(all(target_arch = "x86_64", not(miri)))]
             {
                 use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-                // SAFETY: the instruction neither reads nor writes as far as a program can see,
-                // whatever its address is.
+                // SAFETY: the instruction has no observable effect, for any address.
                 unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
             }
             #[cfg(not(all(target_arch = "x86_64", not(miri))))]

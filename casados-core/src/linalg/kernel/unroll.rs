@@ -1,64 +1,63 @@
-//! Loops over the constant tables of a model, unrolled where they are short.
+//! Loops over the constant tables of a model, unrolled if they are short.
 //!
-//! The optimiser sees through constant tables only where indices are constants too. In an unrolled
-//! loop addresses of blocks and rows are part of the instructions; otherwise most instructions of a
-//! small block are spent on finding it.
+//! The optimiser evaluates constant tables only at constant indices. In an unrolled loop the
+//! addresses of blocks and rows are part of the instructions; otherwise most instructions for a
+//! small block compute its address.
 
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Pivot, Supernode, Update};
 use crate::plan::Plan;
 
-// Where nothing is optimised unrolled loops would only be long, and in firmware memory is dearer
-// than time.
+// Unrolled loops are not compiled in unoptimised programs, where they would only be long, and in
+// firmware, where memory is scarcer than time.
 #[cfg(any(test, all(feature = "std", not(debug_assertions))))]
 mod unrolled;
 
-/// Whether there are lines at all.
+/// Whether loops may be unrolled.
 const MAY_UNROLL: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
-/// So many chunks, and so many pivots, can be written one after the other.
-const MAX_LINES: usize = 48;
+/// Maximal number of chunks, and of pivots, in an unrolled loop.
+const MAX_UNROLLED_PIVOTS: usize = 48;
 
-/// So many rows.
+/// Maximal number of rows in an unrolled loop.
 const MAX_UNROLLED_ROWS: usize = 384;
 
-/// They are not longer than so many instructions: they share the nearest cache, and take long to
-/// compile.
+/// Maximal number of instructions of an unrolled loop, for the L1 cache and the compile time.
 const MAX_UNROLLED_INSTRUCTIONS: usize = 2000;
 
-/// So much longer they may be where each step has so few instructions that a loop would spend most
-/// of its time on finding what it is about: rows of `FEW`, and updates of blocks of one number.
+/// Factor on this maximum for bodies of at most `SHORT_BODY_INSTRUCTIONS`, where a loop would spend
+/// most of its time on addresses: short rows, and updates of blocks of one number.
 const SHORT_BODY_FACTOR: usize = 2;
 const SHORT_BODY_INSTRUCTIONS: usize = 8;
 
-/// What is done with each row of a table.
+/// An operation on each row of a table.
 pub trait RowVisitor {
-    /// The rows of the table, where they are known when the kernel is compiled.
+    /// Number of rows of the table, if it is known at compile time.
     const ROWS: Option<usize>;
-    /// About how many instructions each takes.
+    /// Approximate number of instructions per row.
     const INSTRUCTIONS: usize;
-    /// Whether straight lines are worth their compilation.
+    /// Whether unrolling is worth its compile time.
     const UNROLLED: bool = true;
-    /// To be `#[inline(always)]`.
+    /// Processes a row; `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, row: usize);
-    /// The rows of the table, where they are not known before.
+    /// Number of rows of the table, if it is known at run time only.
     #[inline(always)]
     fn row_count(&self) -> usize {
         0
     }
-    /// So many of the first rows need only what [`simple`](Self::simple) does.
+    /// Number of first rows for which [`visit_simple`](Self::visit_simple) suffices.
     const SIMPLE_ROWS: Option<usize> = Some(0);
-    /// How many these are, where that is not known before.
+    /// Their number, if it is known at run time only.
     #[inline(always)]
     fn simple_row_count(&self) -> usize {
         0
     }
-    /// What a loop does with these instead, without branches. To be `#[inline(always)]`.
+    /// Processes a simple row in a loop, without branches; `#[inline(always)]`.
     #[inline(always)]
     fn visit_simple(&mut self, _row: usize) {}
 }
 
-/// Whether the rows of a table are unrolled.
+/// Whether the loop over the rows of a table is unrolled.
 pub const fn is_unrolled<A: Arithmetic, V: RowVisitor>() -> bool {
     let max_instructions = if V::INSTRUCTIONS <= SHORT_BODY_INSTRUCTIONS {
         SHORT_BODY_FACTOR * MAX_UNROLLED_INSTRUCTIONS
@@ -73,7 +72,7 @@ pub const fn is_unrolled<A: Arithmetic, V: RowVisitor>() -> bool {
         && rows * V::INSTRUCTIONS <= max_instructions
 }
 
-/// All rows of a table.
+/// Processes all rows of a table.
 #[inline(always)]
 pub fn for_each_row<A: Arithmetic, V: RowVisitor>(visitor: &mut V) {
     if const { is_unrolled::<A, V>() } {
@@ -96,19 +95,17 @@ pub fn for_each_row<A: Arithmetic, V: RowVisitor>(visitor: &mut V) {
     }
 }
 
-/// What is done at each pivot of a plan.
+/// An operation at each pivot of a plan.
 pub trait PivotVisitor {
-    /// About how many instructions that takes for each block of the factors, or for each update of
-    /// one.
+    /// Approximate number of instructions per block of the factors, or per update of a block.
     const INSTRUCTIONS: usize;
-    /// Whether it is done for each update, or for each block.
+    /// Whether `INSTRUCTIONS` counts per update, otherwise per block.
     const PER_UPDATE: bool = false;
-    /// With the updates of the pivot, on the way from the first to the last. To be
-    /// `#[inline(always)]`.
+    /// Processes a pivot, with its updates in forward order; `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [Update]);
 }
 
-/// From the first pivot to the last.
+/// Visits the pivots from first to last.
 #[inline(always)]
 pub fn pivots_forward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor: &mut V) {
     if const { is_unrolled_plan::<A, M>(V::PER_UPDATE, V::INSTRUCTIONS) } {
@@ -123,7 +120,7 @@ pub fn pivots_forward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor:
     }
 }
 
-/// From the last pivot to the first, without updates.
+/// Visits the pivots from last to first, without updates.
 #[inline(always)]
 pub fn pivots_backward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor: &mut V) {
     if const { is_unrolled_plan::<A, M>(V::PER_UPDATE, V::INSTRUCTIONS) } {
@@ -131,8 +128,8 @@ pub fn pivots_backward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor
         return unrolled::pivots_backward::<A, M, V>(visitor);
     }
     let all = plan.structure().elimination.pivots;
-    // The optimiser unrolls a loop over indices where a plan is short, as in firmware, but not one
-    // that goes backwards through a slice, which is faster where it stays a loop.
+    // The optimiser unrolls an index loop over a short plan, as in firmware, but not a reverse
+    // iteration over a slice, which is faster as a loop.
     if const { cfg!(feature = "std") } {
         for pivot in all.iter().rev() {
             visitor.at::<A>(pivot, &[]);
@@ -148,19 +145,19 @@ pub fn pivots_backward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor
     }
 }
 
-/// Whether pivots of a [supernode](Supernode) are taken together. In firmware each is one of its
-/// own.
+/// Whether the pivots of a [supernode](Supernode) are processed together. In firmware each pivot is
+/// a supernode.
 const USES_SUPERNODES: bool = cfg!(feature = "std");
 
-/// What is done at each supernode of a plan.
+/// An operation at each supernode of a plan.
 pub trait SupernodeVisitor {
-    /// About how many instructions that takes for each block of the factors.
+    /// Approximate number of instructions per block of the factors.
     const INSTRUCTIONS: usize;
-    /// With all of its pivots. To be `#[inline(always)]`.
+    /// Processes a supernode with its pivots; `#[inline(always)]`.
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]);
 }
 
-/// From the first supernode to the last.
+/// Visits the supernodes from first to last.
 #[inline(always)]
 pub fn supernodes_forward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(plan: M, visitor: &mut V) {
     if const { is_unrolled_plan::<A, M>(false, V::INSTRUCTIONS) } {
@@ -175,7 +172,7 @@ pub fn supernodes_forward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(plan: M, 
     }
 }
 
-/// From the last supernode to the first.
+/// Visits the supernodes from last to first.
 #[inline(always)]
 pub fn supernodes_backward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(plan: M, visitor: &mut V) {
     if const { is_unrolled_plan::<A, M>(false, V::INSTRUCTIONS) } {
@@ -190,7 +187,7 @@ pub fn supernodes_backward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(plan: M,
     }
 }
 
-/// Each pivot is a supernode.
+/// Visits each pivot as a supernode.
 struct SinglePivot<'a, V>(&'a mut V);
 
 impl<V: SupernodeVisitor> PivotVisitor for SinglePivot<'_, V> {
@@ -217,7 +214,7 @@ fn visit_supernode<A: Arithmetic, M: Plan, V: SupernodeVisitor>(
     }
 }
 
-/// Whether a plan may have a supernode of so many pivots.
+/// Whether a plan may have a supernode of `count` pivots.
 const fn has_supernode<M: Plan>(count: u32) -> bool {
     let Some(structure) = M::KNOWN_STRUCTURE else { return true };
     let supernodes = structure.elimination.supernodes;
@@ -231,7 +228,7 @@ const fn has_supernode<M: Plan>(count: u32) -> bool {
     false
 }
 
-/// Whether kernels that go through all blocks of a plan are known to be long.
+/// Whether kernels over all blocks of a plan are known to be long.
 #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
 pub const fn is_large_plan<M: Plan, const S: usize>() -> bool {
     match M::KNOWN_STRUCTURE {
@@ -240,8 +237,8 @@ pub const fn is_large_plan<M: Plan, const S: usize>() -> bool {
     }
 }
 
-/// Whether the pivots of a plan are unrolled, with so many instructions for each block, or for each
-/// update of one.
+/// Whether the loop over the pivots of a plan is unrolled, with this number of instructions per
+/// block, or per update.
 const fn is_unrolled_plan<A: Arithmetic, M: Plan>(updates: bool, instructions: usize) -> bool {
     let Some(structure) = M::KNOWN_STRUCTURE else { return false };
     let plan = &structure.elimination;
@@ -249,10 +246,13 @@ const fn is_unrolled_plan<A: Arithmetic, M: Plan>(updates: bool, instructions: u
     let max_instructions =
         if few { SHORT_BODY_FACTOR * MAX_UNROLLED_INSTRUCTIONS } else { MAX_UNROLLED_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };
-    MAY_UNROLL && A::UNROLLED && plan.pivots.len() <= MAX_LINES && count * instructions <= max_instructions
+    MAY_UNROLL
+        && A::UNROLLED
+        && plan.pivots.len() <= MAX_UNROLLED_PIVOTS
+        && count * instructions <= max_instructions
 }
 
-/// How many blocks a pivot updates.
+/// Number of blocks that a pivot updates.
 const fn update_count(pivot: &Pivot) -> usize {
     ((pivot.upper - pivot.block - 1) * (pivot.end - pivot.upper)) as usize
 }

@@ -1,4 +1,4 @@
-//! The inner loops.
+//! Inner loops over vectors.
 
 use crate::scalar::{Field, Lanes, Real};
 
@@ -13,7 +13,7 @@ pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
 /// `aᵀ b`
 #[inline(always)]
 pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    // Four sums, which the compiler may compute side by side.
+    // Four accumulators, so that the compiler can vectorise.
     let mut sums = [T::ZERO; 4];
     let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
     let (chunks, rest) = a.as_chunks::<4>();
@@ -36,8 +36,7 @@ pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
     }
 }
 
-/// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD
-/// loop.
+/// Whether all elements are finite. Without an early exit, so that it is a SIMD loop.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn are_finite<E: Lanes>(values: &[E]) -> bool {
     let mut finite = E::le(E::zeroed(), E::zeroed());

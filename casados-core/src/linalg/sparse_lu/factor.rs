@@ -1,19 +1,18 @@
-//! Block elimination by a plan that was made before the program runs.
+//! Sparse block elimination with a plan: the elimination order is determined at compile time.
 //!
-//! The Newton matrix `M` has one s×s block for each structural non-zero. In the order of the plan
+//! The Newton matrix `M` has one s×s block for each structural nonzero. In the order of the plan
 //!
 //! ```text
 //! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
 //! ```
 //!
 //! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above.
-//! Everything is indexed by *slots*: a slot is an unknown, and also the equation that determines it
-//! in the plan. So right-hand side and solution share one array, and no permutation is ever
-//! applied.
+//! Everything is indexed by *slots*: a slot is an unknown, and also the equation that is its pivot
+//! row. So right-hand side and solution share one array, and no permutation is applied.
 //!
-//! Where the plan is short its loops are unrolled (`kernel::unroll`). In longer ones the compiler
-//! does not look into the tables of the plan; elements are fetched with `get`, whose never-taken
-//! exit costs nothing beside a block and leaves no panic in the program.
+//! The loops of a short plan are unrolled (`kernel::unroll`). In longer loops the compiler does not
+//! evaluate the tables of the plan; elements are accessed by `get`, whose branch is never taken,
+//! costs nothing compared with a block, and leaves no panic in the program.
 
 use crate::linalg::block::{inverse, product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
@@ -24,7 +23,7 @@ use crate::plan::Plan;
 use crate::scalar::Field;
 use crate::shape::copy;
 
-/// What a matrix is eliminated by.
+/// The factors by the plan.
 pub struct PlannedFactors<'a, M, E, const S: usize> {
     pub plan: M,
     /// `P⁻¹`, `L`, `U`.
@@ -33,9 +32,9 @@ pub struct PlannedFactors<'a, M, E, const S: usize> {
 
 copy!(['a, M: Copy, E, const S: usize] PlannedFactors<'a, M, E, S>);
 
-/// Factorises in place: `blocks` holds the matrix (fill zero, unless it
-/// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
-/// block that is singular leaves elements that are not finite.
+/// Factorises in place: `blocks` holds the matrix (with zero fill-in, unless it
+/// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A singular
+/// pivot block gives factors that are not finite.
 pub fn factor<M: Plan, E: Field, const S: usize>(plan: M, blocks: &mut [Block<E, S>]) {
     dispatch(Factor { plan, blocks });
 }
@@ -73,7 +72,8 @@ impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
             }
         }
         let mut updates = updates.iter();
-        // Small blocks go to registers: the optimiser cannot know that nothing here overlaps.
+        // Copies of small blocks stay in registers: the optimiser cannot prove that blocks do not
+        // overlap.
         if const { S <= 2 } {
             for lower in pivot.lower() {
                 let Some(&lower) = blocks.get(lower) else { continue };
@@ -86,7 +86,7 @@ impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
             }
             return;
         }
-        // What is updated comes later.
+        // Updated blocks come after those of the pivot.
         let Some((own_blocks, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
         for lower in pivot.lower() {
             let Some(&lower) = own_blocks.get(lower) else { continue };
@@ -118,8 +118,8 @@ fn update<A: Arithmetic, M: Plan, E: Field, const S: usize>(
     A::subtract_blocks(block, lower, upper);
 }
 
-/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less
-/// work than to ask; and where it is little.
+/// Whether a block of fill-in begins with its first update. Otherwise it begins with zero: cheaper
+/// for scalars, and for little fill-in.
 pub const fn begins_with_update<M: Plan, E>() -> bool {
     let has_much_fill = match M::KNOWN_STRUCTURE {
         Some(Structure { elimination, .. }) => 8 * elimination.fill() >= elimination.slots.len(),
@@ -128,7 +128,7 @@ pub const fn begins_with_update<M: Plan, E>() -> bool {
     align_of::<E>() > 8 && has_much_fill
 }
 
-/// Fill of the matrix, a row of its assembly.
+/// Clears a block of fill-in, given by its row of the assembly.
 #[inline(always)]
 pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, zero: B) {
     let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
@@ -140,14 +140,14 @@ pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, ze
     }
 }
 
-/// Always; but the optimiser then knows their number, and with it how often loops over constant
-/// tables go round.
+/// Always true. It makes the number of blocks known to the optimiser, and with it the number of
+/// iterations of loops over constant tables.
 #[inline(always)]
 pub fn has_all_blocks<M: Plan, B>(plan: M, blocks: &[B]) -> bool {
     blocks.len() == plan.structure().elimination.slots.len()
 }
 
-/// The blocks of a range, each with the slot at its other end.
+/// Returns the blocks of a range, each with the slot of its other index.
 #[inline(always)]
 pub fn blocks_with_slots<'a, M: Plan, E, const S: usize>(
     factors: PlannedFactors<'a, M, E, S>,

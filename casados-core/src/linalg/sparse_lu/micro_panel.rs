@@ -1,11 +1,11 @@
-//! Packets of right-hand sides, between memory and registers.
+//! Panel rows of right-hand sides, between memory and registers.
 
 use crate::linalg::block::{PanelRow, subtract_product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
 use crate::shape::{Array, Plain};
 
-/// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
+/// Loads a panel row. The caller has checked the slot, so that there is no branch here.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
@@ -23,7 +23,7 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     panel_row
 }
 
-/// `panel_row − block · other`, with the other in the memory.
+/// `panel_row − block · other`, with `other` in memory.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_from_memory<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     panel_row: &mut PanelRow<E, S, W>,
@@ -43,7 +43,7 @@ pub fn subtract_from_memory<A: Arithmetic, E: Field + Plain, R: Array<E>, const 
     });
 }
 
-/// In loops: a closure would be compiled for every machine.
+/// Nested loops: a closure would be compiled for every instruction set.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],

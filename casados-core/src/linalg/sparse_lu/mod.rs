@@ -1,6 +1,5 @@
-//! Block elimination by a plan that was made before the program runs: [factors](factor), and
-//! right-hand sides by them, [forward and back](solve) and [transposed](solve_transposed),
-//! [micro-panel](micro_panel) by micro-panel.
+//! Sparse block elimination with a plan: [factors](factor), [forward and back substitution](solve),
+//! the [transposed systems](solve_transposed), and the transfer of [panel rows](micro_panel).
 
 pub mod factor;
 mod micro_panel;

@@ -1,9 +1,9 @@
-//! Right-hand sides by the factors of a plan (`factor`): down through `I + L`, up through `P + U`,
-//! and both transposed.
+//! Triangular solves with the factors of a plan (`factor`): forward substitution with `I + L`, back
+//! substitution with `P + U`, and the transposed systems.
 //!
-//! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each
-//! other. Where one column fills registers, what is added to a row is added in them instead, and
-//! stored once.
+//! For scalars a pivot is subtracted from all rows below it, so that these operations are
+//! independent. If one column fills registers, the updates of a row are accumulated in registers
+//! instead, and stored once.
 
 use super::factor::{PlannedFactors, blocks_with_slots, has_all_blocks};
 use super::micro_panel::{is_zero, load, store, subtract_from_memory};
@@ -18,11 +18,10 @@ use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 use core::marker::PhantomData;
 
-/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
-/// columns.
+/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot in all columns.
 ///
-/// Columns are taken in panel rows that fit registers, each through the whole elimination: a
-/// panel row of all rows stays in the nearest cache.
+/// Columns are processed in panels that fit registers, each through the whole elimination, so that
+/// a panel of all slots stays in the L1 cache.
 pub fn solve<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -46,8 +45,8 @@ pub fn solve_transposed<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     });
 }
 
-/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
-/// registers themselves two at a time, or the panel row of all stages would not fit them.
+/// Solves two triangular systems for all columns, eight, four, two and one at a time; SIMD
+/// registers two at a time, so that the panel row of all stages fits the registers.
 struct Solve<'a, M, E, R, First, Second, const S: usize> {
     factors: PlannedFactors<'a, M, E, S>,
     rows: &'a mut [[R; S]],
@@ -92,20 +91,20 @@ impl<
     }
 }
 
-/// Who is present while panel rows are solved. What is here is to be `#[inline(always)]`.
+/// A visitor of the solution. Its functions are `#[inline(always)]`.
 pub trait Visitor<E, const S: usize, const W: usize> {
-    /// Sees an unknown that has just been found, but not of a transposed system.
+    /// Visits an unknown that has just been solved for; not called for transposed systems.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_solved<A: Arithmetic>(&mut self, _slot: usize, _packet: &PanelRow<E, S, W>) {}
-    /// A pivot of the second system is done.
+    /// Called after each pivot of the second system.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_pivot_done(&mut self) {}
 }
 
-/// Nobody.
+/// The empty visitor.
 impl<E, const S: usize, const W: usize> Visitor<E, S, W> for () {}
 
-/// Who asks for memory meanwhile, line by line.
+/// A visitor that prefetches memory, line by line.
 impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Prefetch<'_, E> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_pivot_done(&mut self) {
@@ -113,8 +112,8 @@ impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Prefetch<'_, E> {
     }
 }
 
-/// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved
-/// through the second is shown to somebody, while it is in registers.
+/// Solves two triangular systems in place for `W` columns, inside of a kernel. The visitor receives
+/// the solution of the second one while it is in registers.
 #[inline(always)]
 pub fn solve_triangular_pair<
     A: Arithmetic,
@@ -148,18 +147,18 @@ pub fn solve_triangular_pair<
     pivots_backward::<A, M, _>(factors.plan, &mut second);
 }
 
-/// `W` columns of right-hand sides on their way.
+/// A substitution in `W` columns of right-hand sides.
 pub struct Substitution<'a, M, E, R, V, const S: usize, const W: usize> {
     pub factors: PlannedFactors<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
-    /// Of what is solved through `P + U`.
+    /// The visitor of the solution of the second system.
     pub visitor: &'a mut V,
 }
 
 /// A triangular system.
 pub trait TriangularSystem {
-    /// What is done at a pivot.
+    /// Processes a pivot.
     fn at<
         A: Arithmetic,
         M: Plan,
@@ -174,7 +173,7 @@ pub trait TriangularSystem {
     );
 }
 
-/// A way through a system.
+/// A substitution, as a visitor of pivots.
 struct SystemVisitor<Y, T>(T, PhantomData<Y>);
 
 impl<
@@ -198,7 +197,7 @@ impl<
     }
 }
 
-/// One of the systems, of which each has its own instructions.
+/// Defines one of the triangular systems.
 macro_rules! system {
     ($(#[$text:meta])* $name:ident: $what:ident) => {
         $(#[$text])*
@@ -217,19 +216,19 @@ macro_rules! system {
 }
 
 system!(
-    /// `I + L`
+    /// Forward substitution with `I + L`.
     ForwardSubstitution: down
 );
 system!(
-    /// `P + U`
+    /// Back substitution with `P + U`.
     BackSubstitution: up
 );
 system!(
-    /// `(P + U)ᵀ`
+    /// Forward substitution with `(P + U)ᵀ`.
     TransposedForwardSubstitution: transposed_down
 );
 system!(
-    /// `(I + L)ᵀ`
+    /// Back substitution with `(I + L)ᵀ`.
     TransposedBackSubstitution: transposed_up
 );
 
@@ -238,7 +237,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
 {
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        // What is added to a row is added in registers where one column fills them.
+        // If one column fills registers, the updates of a row are accumulated in registers.
         if const { align_of::<E>() > 8 && is_solved_by_rows::<M>(size_of::<Block<E, S>>()) } {
             self.forward_by_rows::<A>(pivot);
         } else {
@@ -253,9 +252,9 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         if slot >= rows.len() {
             return;
         }
-        // Directions that have not reached this unknown, as at the start of an interval. Of
-        // registers the memory is asked: a panel row of which single elements are looked at is not
-        // kept in registers. Of numbers the panel row is, all of it at once.
+        // Skips rows of zeros: directions without influence on this unknown, as at the start of an
+        // interval. SIMD registers are compared in memory, since a panel row whose elements are
+        // compared one by one leaves the registers. Scalars are compared in the loaded panel row.
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
@@ -275,7 +274,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         }
     }
 
-    /// What pivots before this one subtract from its row.
+    /// Subtracts the products with all preceding pivots from a row.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn forward_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
@@ -305,7 +304,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
-            // Of one number the inverse: the panel row then stays in its registers.
+            // For one stage the inverse is negated, so that the panel row stays in its registers.
             if const { S == 1 } {
                 let mut inverse = *inverse;
                 negate(&mut inverse);
@@ -321,9 +320,9 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
     }
 }
 
-/// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
-/// another column. Of large blocks that the second cache holds the processor fetches some columns
-/// ahead side by side, but no more than that.
+/// Whether right-hand sides of SIMD registers are solved with `L` row by row. The blocks of a row
+/// are in different columns. For large blocks in the second-level cache the processor prefetches a
+/// limited number of columns.
 const fn is_solved_by_rows<M: Plan>(block: usize) -> bool {
     let Some(structure) = M::KNOWN_STRUCTURE else { return block <= 256 };
     let pivots = structure.elimination.pivots;

@@ -1,9 +1,9 @@
-//! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through
+//! Triangular solves with the transposed factors of a plan: the operations at a pivot for
 //! `(P + U)ᵀ` and `(I + L)ᵀ`.
 //!
-//! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added
-//! in registers, and stored once. Packets take two blocks at a time, so that additions need not
-//! wait for each other.
+//! A row of `(I + L)ᵀ` is a column of `L`, so that in back substitution the updates of a row are
+//! accumulated in registers, and stored once. Panels process two blocks at a time, with independent
+//! additions.
 
 use super::factor::{PlannedFactors, blocks_with_slots};
 use super::micro_panel::{load, store};
@@ -44,7 +44,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(in crate::linalg) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        // Where nothing is optimised this would only take long to compile.
+        // Without optimisation this would only cost compile time.
         if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
             return self.transposed_backward_two_sums::<A>(pivot);
         }
@@ -64,7 +64,8 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         store(rows, pivot.slot as usize, *column, &panel_row);
     }
 
-    /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
+    /// Two blocks at a time, with one accumulator each, so that additions do not wait for each
+    /// other.
     #[inline(always)]
     fn transposed_backward_two_sums<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
@@ -101,7 +102,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
     }
 }
 
-/// One block, with the slot at its other end.
+/// Returns one block, with the slot of its other index.
 #[inline(always)]
 fn block_with_slot<'a, M: Plan, E, const S: usize>(
     factors: PlannedFactors<'a, M, E, S>,

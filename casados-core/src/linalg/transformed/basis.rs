@@ -1,17 +1,18 @@
-//! The Newton matrix of stages that share one Jacobian, in the eigenbasis of the tableau.
+//! The Newton matrix of stages that share one Jacobian, in the eigenbasis of the tableau (Butcher
+//! transformation).
 //!
-//! With one Jacobian for all stages the Newton matrix is `I ⊗ [f_ẋ | f_z] + h A ⊗ [f_x | 0]`. From
-//! `A = V diag(μ) V⁻¹` it falls into `S` systems of the size of the model,
+//! With one Jacobian for all stages the Newton matrix is `I ⊗ [f_ẋ | f_z] + h A ⊗ [f_x | 0]`. With
+//! `A = V diag(μ) V⁻¹` it decomposes into `S` systems of the size of the model,
 //!
 //! ```text
 //! [f_ẋ + hμ_l f_x | f_z] ŷ_l = b̂_l        b̂ = V⁻¹ b        y = V ŷ
 //! ```
 //!
-//! of which complex conjugate ones need to be solved only once (J. C. Butcher 1976; E. Hairer, G.
-//! Wanner, Solving Ordinary Differential Equations II, section IV.8). All have the pattern and the
-//! elimination plan of the model, so they are solved side by side: `⌊S/2⌋` complex numbers and a
-//! real one if `S` is odd. Where registers are to be filled, a real eigenvalue takes part as a
-//! complex one, and what is left of a register repeats the last.
+//! of which one per complex conjugate pair is solved (J. C. Butcher 1976; E. Hairer, G. Wanner,
+//! Solving Ordinary Differential Equations II, section IV.8). All have the sparsity pattern and the
+//! elimination plan of the model, so they are solved together: `⌊S/2⌋` complex numbers and a real
+//! one if `S` is odd. To fill registers, a real eigenvalue may be stored as a complex one, and the
+//! last eigenvalue may be repeated.
 
 use super::complex::Complex;
 use super::decomposition::{DecompositionMemory, EigenbasisParts, decompose};
@@ -20,22 +21,22 @@ use crate::scalar::Lanes;
 use crate::tableau::Tableau;
 
 /// `A = V diag(μ) V⁻¹` of a tableau with at most one real eigenvalue, such as those of Gauss and
-/// Radau, all in real numbers: one for each part of what is complex.
+/// Radau methods, in real arithmetic: `N` real parts for the complex numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Eigenbasis<T, const S: usize, const N: usize> {
-    /// `μ`; of conjugate ones that with the positive imaginary part. A real one is the real number
-    /// at the end, or the first of the complex ones if there is no such.
+    /// `μ`; for a conjugate pair the eigenvalue with positive imaginary part. A real eigenvalue is
+    /// the real number at the end, or without one the first complex number.
     pub(in crate::linalg) eigenvalues: Complex<T, N>,
-    /// Columns of `V⁻¹`, one for each stage.
+    /// Columns of `V⁻¹`, one per stage.
     left_vectors: [Complex<T, N>; S],
-    /// Columns of `V`, one for each part, with a factor of two where they stand for a conjugate
-    /// too.
+    /// Columns of `V`, one per part, with a factor of two for conjugate pairs.
     right_vectors: [[T; S]; N],
 }
 
 impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
-    /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than
-    /// `1e-10`. Not inlined: callers would have each of its numbers by itself.
+    /// Returns `None` if `A` has no such basis, or one so ill-conditioned that it reproduces `A`
+    /// with an error above `1e-10`. Not inlined, since inlining would scalarise every number in the
+    /// caller.
     #[cfg_attr(feature = "std", inline(never))]
     pub fn new(tableau: &Tableau<S>) -> Option<Self> {
         const {
@@ -71,19 +72,19 @@ impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
     }
 
     #[cfg(feature = "alloc")]
-    /// The eigenvalues `μ` of `A`: of each complex pair there is one.
+    /// The eigenvalues `μ` of `A`, one per conjugate pair.
     pub fn eigenvalues(&self) -> &Complex<T, N> {
         &self.eigenvalues
     }
 
     #[cfg(feature = "alloc")]
-    /// Columns of `V⁻¹`, one for each stage.
+    /// Columns of `V⁻¹`, one per stage.
     pub fn left_vectors(&self) -> &[Complex<T, N>; S] {
         &self.left_vectors
     }
 
     #[cfg(feature = "alloc")]
-    /// Columns of `V`, one for each part: `y = Σ_l right_l ŷ_l`.
+    /// Columns of `V`, one per part: `y = Σ_l right_l ŷ_l`.
     pub fn right_vectors(&self) -> &[[T; S]; N] {
         &self.right_vectors
     }
@@ -115,8 +116,9 @@ mod tests {
     use crate::tableau::{Gauss, Method, RadauIIA};
     use core::array::from_fn;
 
-    /// Whether the systems of the basis are those of `A`: `V μ V⁻¹ b = A b`. Errors are those of
-    /// eigenvectors, ε times the condition of the basis, which is the size of the terms of the sum.
+    /// Checks that the systems of the basis are those of `A`: `V μ V⁻¹ b = A b`. Errors of
+    /// eigenvectors are ε times the condition number of the basis, which is the magnitude of the
+    /// terms of the sum.
     fn check<const S: usize, const N: usize>(tableau: &Tableau<S>) {
         let basis = Eigenbasis::<f64, S, N>::new(tableau).expect("a basis");
         for column in 0..S {
@@ -132,8 +134,8 @@ mod tests {
                     terms += (right[N - 1] * image.parts[N - 1]).abs();
                 }
                 let error = (found - tableau.a()[stage][column]).abs();
-                // The elimination that finds an eigenvector, and the sums of `split` and `join`,
-                // round S² times.
+                // The elimination for an eigenvector, and the sums of `transform` and
+                // `transform_back`, take S² rounding errors.
                 let roundings = f64::max(64.0, (S * S) as f64);
                 assert!(
                     error <= roundings * f64::EPSILON * terms,
@@ -168,8 +170,8 @@ mod tests {
         check::<9, 9>(&RadauIIA::<9>::TABLEAU);
     }
 
-    /// The real eigenvalue of the three-stage Radau IIA method, `(6 + 81^(1/3) − 9^(1/3)) / 30`:
-    /// its inverse `γ = 3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner, section IV.8.
+    /// The real eigenvalue of the three-stage Radau IIA method, `(6 + 81^(1/3) − 9^(1/3)) / 30`.
+    /// Hairer and Wanner, section IV.8, publish its inverse `γ = 3 + 3^(2/3) − 3^(1/3)`.
     #[test]
     fn published_eigenvalue() {
         let basis = Eigenbasis::<f64, 3, 3>::new(&RadauIIA::<3>::TABLEAU).expect("a basis");
@@ -177,7 +179,7 @@ mod tests {
         assert!((1.0 / basis.eigenvalues().parts[2] - gamma).abs() <= 32.0 * f64::EPSILON * gamma);
     }
 
-    /// A diagonally implicit tableau has one eigenvalue twice, and no basis.
+    /// A diagonally implicit tableau has a double eigenvalue and no eigenbasis.
     #[test]
     fn defective_tableaux_have_none() {
         let gamma = 1.0 - 0.5f64.sqrt();

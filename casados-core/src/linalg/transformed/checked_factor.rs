@@ -1,5 +1,5 @@
-//! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted
-//! where they do not: what steps of variable size iterate with.
+//! Factors in the eigenbasis of the tableau with a check of their accuracy, and with pivoting of
+//! the whole matrices as fallback; used by adaptive integrators.
 
 use super::complex::Complex;
 use crate::linalg::dense_lu::DenseLu;
@@ -15,13 +15,13 @@ use crate::shape::{Aligned, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// So many eigenvalues there may be, of complex conjugate ones one.
+/// Maximal number of eigenvalues, one per conjugate pair.
 const MAX_EIGENVALUES: usize = 4;
 
-/// The parts of a number for each of them.
+/// Number of real parts of a number for all eigenvalues.
 pub const COMPLEX_PARTS: usize = 2 * MAX_EIGENVALUES;
 
-/// A right-hand side or a solution of the systems of all eigenvalues, one row for each slot.
+/// A right-hand side or a solution of the systems of all eigenvalues, one row per slot.
 pub type EigenRows<M, T> = ArrayK<M, [[Complex<T, COMPLEX_PARTS>; 1]; 1]>;
 
 /// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all eigenvalues.
@@ -29,36 +29,37 @@ pub type EigenRows<M, T> = ArrayK<M, [[Complex<T, COMPLEX_PARTS>; 1]; 1]>;
 #[zeroable(bound = "T: Zeroable")]
 pub struct EigenFactors<M: Dae, T: Plain> {
     blocks: Aligned<M::Factors<[[Complex<T, COMPLEX_PARTS>; 1]; 1]>>,
-    /// The Jacobian, and `hμ`: what kinematic states are eliminated by.
+    /// The Jacobian, and `hμ`: used to condense kinematic states.
     jacobian: M::Jacobian<T>,
     h_mu: Complex<T, COMPLEX_PARTS>,
-    /// Memory that is touched only where the plan is not good enough: real and imaginary part as
-    /// two stages.
+    /// Memory of the dense fallback, untouched while the plan is accurate; real and imaginary part
+    /// are two stages.
     dense: [DenseLu<M, T, 2>; MAX_EIGENVALUES],
     is_dense: bool,
     pivoted: bool,
 }
 
 impl<M: Dae, T: Real> EigenFactors<M, T> {
-    /// Whether the plan is in use, so that pivoting may give better factors.
+    /// Whether the plan is used, so that pivoting may improve the factors.
     fn uses_plan(&self) -> bool {
         !self.pivoted && M::STRUCTURE.elimination.has_plan()
     }
 
-    /// Whether the factors that are there are those of the plan.
+    /// Whether the current factors are those of the plan.
     pub fn has_planned_factors(&self) -> bool {
         !self.is_dense
     }
 
-    /// From now on, whether every matrix is to be pivoted.
+    /// Sets whether all following factorisations pivot the whole matrices.
     pub fn set_pivoted(&mut self, pivoted: bool) {
         self.pivoted = pivoted;
     }
 
-    /// Factors of the matrices of a Jacobian. Whether those of the plan hold, if there is one.
+    /// Factorises the matrices of a Jacobian. Returns `false` if there is a plan whose factors are
+    /// not used.
     ///
     /// # Errors
-    /// The unknown for which there is no pivot.
+    /// The unknown without a pivot.
     pub fn factor(
         &mut self,
         jacobian: &M::Jacobian<T>,
@@ -74,13 +75,13 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         Ok(!self.is_dense || !M::STRUCTURE.elimination.has_plan())
     }
 
-    /// By the plan; whether that went well.
+    /// Factorises by the plan; returns whether the factors are finite.
     fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, COMPLEX_PARTS>) -> bool {
         let blocks = self.blocks.as_mut();
         dispatch(Assemble::<M, T> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
     }
 
-    /// By pivoting whole matrices.
+    /// Factorises with pivoting of the whole matrices.
     fn factor_dense(
         &mut self,
         jacobian: &M::Jacobian<T>,
@@ -92,7 +93,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
             for_each_dense_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
                 let (r, c, value) =
                     (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
-                let (re, im) = match place.order {
+                let (re, im) = match place.ha_power {
                     0 => (T::ONE, T::ZERO),
                     1 => scale.get(l),
                     _ => square.get(l),
@@ -100,7 +101,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
                 dense.add_row(r, c, 0, value, &[re, -im]);
                 dense.add_row(r, c, 1, value, &[im, re]);
             });
-            // Their rows stay.
+            // Rows of kinematic states are those of the unit matrix.
             for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
                 (0..2).for_each(|part| dense.add(state, state, part, T::ONE));
             }
@@ -145,14 +146,15 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         }
     }
 
-    /// The componentwise backward error of a solution by these factors, the largest of all
-    /// equations and eigenvalues (W. Oettli, W. Prager, Numer. Math. 6 (1964)): the solution is
-    /// known, and each of its unknowns is of the size of its `unit`.
+    /// Returns the componentwise backward error of a solution with these factors, the largest of
+    /// all equations and eigenvalues (W. Oettli, W. Prager, Numer. Math. 6 (1964)). The exact
+    /// solution is given: a multiple of `units` for each unknown.
     #[inline(never)]
     pub fn backward_error(&self, units: &ArrayK<M, T>) -> f64 {
         let mut right = EigenRows::<M, T>::zeroed();
         for (index, ([[row]], unit)) in right.as_mut().iter_mut().zip(units.as_ref()).enumerate() {
-            // Neither equal nor alternating, so that no structure hides an error.
+            // Weights that are neither equal nor alternating, so that no structure of the model
+            // hides an error.
             let weight = (1 + index * 7 % 11) as f64 * if index * 5 % 7 < 3 { -0.2 } else { 0.2 };
             *row = Complex::real(T::from_f64(weight) * *unit);
         }
@@ -186,7 +188,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         for (sizes, [[row]]) in sizes.as_ref().iter().zip(right.as_ref()) {
             for (l, sum) in sizes.iter().enumerate() {
                 let error = (size(*row, l) / *sum).to_f64();
-                // Nothing of nothing is no error; a solution that is not finite is one.
+                // An equation whose terms are all zero has no error; a solution that is not finite
+                // has an infinite one.
                 if *sum != T::ZERO && (error.is_nan() || error > largest) {
                     largest = if error.is_nan() { f64::INFINITY } else { error };
                 }
@@ -195,14 +198,14 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         largest
     }
 
-    /// The terms of the product of the matrices with a solution, each with the slot of its
+    /// Visits the terms of the product of the matrices with a solution, each with the slot of its
     /// equation.
     fn multiply(&self, solution: &EigenRows<M, T>, mut term: impl FnMut(usize, Complex<T, COMPLEX_PARTS>)) {
         let square = self.h_mu * self.h_mu;
         for_each_dense_entry::<M, _>(self.jacobian.as_ref(), |place, &value, minus_c| {
             let value = minus_c.map_or(value, |&minus_c| -(minus_c * value));
             let [[unknown]] = solution[place.column];
-            let unknown = match place.order {
+            let unknown = match place.ha_power {
                 0 => unknown,
                 1 => self.h_mu * unknown,
                 _ => square * unknown,
@@ -226,7 +229,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     }
 }
 
-/// The matrices and their factors; whether these are finite.
+/// Assembles and factorises the matrices; returns whether the pivots are finite.
 struct Assemble<'a, M, T> {
     jacobian: &'a [T],
     scale: &'a Complex<T, COMPLEX_PARTS>,
@@ -245,7 +248,7 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
         for entry in plan.assembly {
             let Some([[to]]) = blocks.get_mut(entry.block as usize) else { continue };
             let mut element = if entry.first { Complex::zero() } else { *to };
-            // An index that marks what is not there lies outside of the Jacobian.
+            // Absent entries have an index outside of the Jacobian.
             if let Some(&(mut value)) = jacobian.get(entry.entry as usize) {
                 if let Some(&minus_c) = jacobian.get(entry.by as usize) {
                     value = -(minus_c * value);
@@ -259,7 +262,7 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
             *to = element;
         }
         factor::Factor::<_, _, 1> { plan: Known::<M>::PLAN, blocks: &mut *blocks }.run::<A>();
-        // A pivot that vanishes leaves infinite elements or NaN.
+        // A vanishing pivot gives an inverse of infinity or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
     }

@@ -1,20 +1,20 @@
-//! Complex numbers, several side by side.
+//! Vectors of complex numbers.
 
 use crate::scalar::{Field, Known, Lanes};
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `⌊N/2⌋` complex numbers side by side, and a real one if `N` is odd: what elimination computes
-/// with where it solves systems of one pattern at once.
+/// `⌊N/2⌋` complex numbers, and a real one if `N` is odd: the numbers of an elimination of several
+/// systems with one pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-#[repr(transparent)] // All parts beside each other, so that they may be one register.
+#[repr(transparent)] // Adjacent parts, so that they may be one register.
 pub struct Complex<T, const N: usize> {
-    /// Real parts, then imaginary ones, then the real number.
+    /// Real parts, then imaginary parts, then the real number.
     pub parts: [T; N],
 }
 
 impl<T: Lanes, const N: usize> Complex<T, N> {
-    /// So many of them are complex.
+    /// Number of complex numbers.
     pub const PAIRS: usize = N / 2;
 
     /// Zeros.
@@ -23,7 +23,7 @@ impl<T: Lanes, const N: usize> Complex<T, N> {
         Self { parts: [T::from_f64(0.0); N] }
     }
 
-    /// The same real number everywhere.
+    /// The same real number in all places.
     #[inline(always)]
     pub fn real(value: T) -> Self {
         Self::zero().plus(value)
@@ -50,19 +50,19 @@ impl<T: Lanes, const N: usize> Complex<T, N> {
         self
     }
 
-    /// Real and imaginary part of one of them.
+    /// Returns the real and the imaginary part of number `l`.
     #[inline(always)]
     pub fn get(&self, l: usize) -> (T, T) {
         (self.parts[l], self.parts[Self::PAIRS + l])
     }
 
-    /// Overwrites one of them.
+    /// Sets number `l`.
     #[inline(always)]
     pub fn set(&mut self, l: usize, (re, im): (T, T)) {
         (self.parts[l], self.parts[Self::PAIRS + l]) = (re, im);
     }
 
-    /// Whether all parts are neither infinite nor NaN.
+    /// Whether all parts are finite.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
         let mut finite = true;
@@ -113,7 +113,7 @@ impl<T: Lanes, const N: usize> Mul for Complex<T, N> {
 impl<T: Lanes, const N: usize> Div for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
-    #[allow(clippy::suspicious_arithmetic_impl)] // There is no other quotient.
+    #[allow(clippy::suspicious_arithmetic_impl)] // The only definition of a quotient.
     fn div(self, other: Self) -> Self {
         self * other.reciprocal()
     }
@@ -131,7 +131,7 @@ impl<T: Lanes, const N: usize> Neg for Complex<T, N> {
 }
 
 impl<T: Lanes, const N: usize> Field for Complex<T, N> {
-    /// One for each part.
+    /// One mask per part.
     type Mask = [T::Mask; N];
 
     #[inline(always)]
@@ -139,7 +139,7 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
         Self::real(T::from_f64(value))
     }
 
-    /// Divided by its larger part first, so that no square of a part overflows.
+    /// Divides by the larger part first, so that squares do not overflow.
     #[inline(always)]
     fn reciprocal(mut self) -> Self {
         for l in 0..Self::PAIRS {
@@ -157,7 +157,7 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
 
     #[inline(always)]
     fn subtract_product(mut self, a: Self, b: Self) -> Self {
-        // Kernels alone have numbers of this type.
+        // Only kernels use numbers of this type, on machines with the instructions.
         T::subtract_complex(&mut self.parts, &a.parts, &b.parts, Known::<false>::assume_detected());
         self
     }
@@ -176,7 +176,7 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
         }
     }
 
-    /// By `|re| + |im|`.
+    /// Compares `|re| + |im|`.
     #[inline(always)]
     fn is_smaller(self, other: Self) -> Self::Mask {
         let zero = T::from_f64(0.0);

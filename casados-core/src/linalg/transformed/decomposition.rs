@@ -1,5 +1,5 @@
-//! Eigenvalues and eigenvectors of the matrix of a tableau: on slices, so that they are compiled
-//! once for all numbers of stages. Matrices have their rows one after the other.
+//! Eigenvalues and eigenvectors of the matrix of a tableau, on slices, so that they are compiled
+//! once for all numbers of stages. Matrices are in row-major order.
 
 use super::complex::Complex;
 use bytemuck::Zeroable;
@@ -7,8 +7,8 @@ use bytemuck::Zeroable;
 /// One complex number.
 type ComplexNumber = Complex<f64, 2>;
 
-/// `A = V diag(μ) V⁻¹` of `s` stages in `n` parts, as [`Eigenbasis`](super::basis::Eigenbasis) has
-/// it.
+/// `A = V diag(μ) V⁻¹` of `s` stages in `n` parts, in the layout of
+/// [`Eigenbasis`](super::basis::Eigenbasis).
 pub(super) struct EigenbasisParts<'a> {
     /// `μ`
     pub eigenvalues: &'a mut [f64],
@@ -18,43 +18,43 @@ pub(super) struct EigenbasisParts<'a> {
     pub right_vectors: &'a mut [f64],
 }
 
-/// What is computed with, for `s` stages.
+/// Scratch memory of the decomposition, for `s` stages.
 pub(super) struct DecompositionMemory<'a> {
     pub roots: &'a mut [ComplexNumber],
     /// A left and a right eigenvector.
     pub vectors: [&'a mut [ComplexNumber]; 2],
     pub matrix: &'a mut [ComplexNumber],
-    /// Those of the characteristic polynomial.
+    /// Coefficients of the characteristic polynomial.
     pub coefficients: &'a mut [f64],
     pub powers: [&'a mut [f64]; 2],
 }
 
-/// An element, or zero outside: nothing in here can panic, and the optimiser does not see that all
-/// places are inside.
+/// Returns an element, or zero outside, so that nothing can panic; the optimiser cannot prove that
+/// all indices are inside.
 fn get_or_zero<T: Copy + Zeroable>(elements: &[T], index: usize) -> T {
     elements.get(index).copied().unwrap_or(T::zeroed())
 }
 
-/// Overwrites an element.
+/// Sets an element.
 fn set_if_inside<T>(elements: &mut [T], index: usize, value: T) {
     if let Some(element) = elements.get_mut(index) {
         *element = value;
     }
 }
 
-/// Two elements in each other's place.
+/// Swaps two elements.
 fn swap_if_inside<T>(elements: &mut [T], i: usize, j: usize) {
     if i.max(j) < elements.len() {
         elements.swap(i, j);
     }
 }
 
-/// Whether there is such a basis, and it reproduces `A` to `1e-10`.
+/// Computes the basis; returns whether it exists and reproduces `A` to `1e-10`.
 #[inline(never)]
 pub(super) fn decompose(a: &[f64], parts: EigenbasisParts<'_>, memory: &mut DecompositionMemory<'_>) -> bool {
     let (s, n) = (memory.roots.len(), parts.eigenvalues.len());
     let half = n / 2;
-    // Where the real one is no number of its own it is the first of the complex ones.
+    // Without a real number at the end, the real eigenvalue is the first complex number.
     let first = usize::from(s % 2 == 1 && n.is_multiple_of(2));
     let (mut reals, mut pairs) = (0, first);
     eigenvalues(a, memory);
@@ -92,7 +92,7 @@ pub(super) fn decompose(a: &[f64], parts: EigenbasisParts<'_>, memory: &mut Deco
             }
         }
     }
-    // What is left of a register repeats the last.
+    // The last eigenvalue is repeated to fill the register.
     let last = pairs.saturating_sub(1);
     for lane in pairs..half {
         for begin in [0, half] {
@@ -122,8 +122,8 @@ fn reproduces(a: &[f64], parts: &EigenbasisParts<'_>, s: usize) -> bool {
     (0..s).all(|i| (0..s).all(|j| is_same(i, j)))
 }
 
-/// All eigenvalues, to half the digits at least: the zeros of the characteristic polynomial (D. K.
-/// Faddeev), all at once by the iteration of Durand and Kerner.
+/// Computes all eigenvalues, to half the digits at least: the zeros of the characteristic
+/// polynomial (D. K. Faddeev), by the simultaneous iteration of Durand and Kerner.
 fn eigenvalues(a: &[f64], memory: &mut DecompositionMemory<'_>) {
     let DecompositionMemory { roots, coefficients, powers: [product, next], .. } = memory;
     let s = roots.len();
@@ -143,8 +143,7 @@ fn eigenvalues(a: &[f64], memory: &mut DecompositionMemory<'_>) {
         let trace: f64 = (0..s).map(|i| get_or_zero(product, i * s + i)).sum();
         set_if_inside(coefficients, s - k, -trace / k as f64);
     }
-    // All zeros are of the size of the geometric mean of them; the start values lie around it, not
-    // symmetric.
+    // The start values lie around the geometric mean of the zeros, asymmetrically.
     let mut power = Complex::real(coefficients.first().map_or(1.0, |c| nth_root(c.abs(), s)));
     for root in roots.iter_mut() {
         power = power * Complex { parts: [0.4, 0.9] };
@@ -168,7 +167,7 @@ fn eigenvalues(a: &[f64], memory: &mut DecompositionMemory<'_>) {
     }
 }
 
-/// `a^(1/n)` by bisection: no elementary functions are needed for it.
+/// `a^(1/n)` by bisection, without elementary functions.
 fn nth_root(a: f64, n: usize) -> f64 {
     let (mut low, mut high) = (0.0, 1.0f64.max(a));
     for _ in 0..60 {
@@ -179,9 +178,8 @@ fn nth_root(a: f64, n: usize) -> f64 {
     high
 }
 
-/// From an approximate eigenvalue: the eigenvalue, and in the memory the left and the right
-/// eigenvector with product one. Two-sided inverse iteration with the quotient of Rayleigh (A. M.
-/// Ostrowski 1959).
+/// Improves an approximate eigenvalue, and computes its left and right eigenvectors, with product
+/// one. Two-sided inverse iteration with the Rayleigh quotient (A. M. Ostrowski 1959).
 fn eigenvectors(
     a: &[f64],
     start: ComplexNumber,
@@ -192,7 +190,7 @@ fn eigenvectors(
     left.fill(Complex::real(1.0));
     right.fill(Complex::real(1.0));
     for _ in 0..6 {
-        // Beside the eigenvalue, so that the matrix is regular.
+        // Shifted off the eigenvalue, so that the matrix is regular.
         let shift = value.scaled(1.0 + 1e-10);
         for (vector, transposed) in [(&mut *right, false), (&mut *left, true)] {
             for i in 0..s {
@@ -226,7 +224,7 @@ fn eigenvectors(
     value.is_finite().then_some(value)
 }
 
-/// `a / b` with divisions where `Div`, which has to be fast, multiplies by reciprocals.
+/// `a / b` with divisions; `Div`, which has to be fast, multiplies by reciprocals.
 fn divide(a: ComplexNumber, b: ComplexNumber) -> ComplexNumber {
     let ([a_re, a_im], [b_re, b_im]) = (a.parts, b.parts);
     let size = b_re.abs().max(b_im.abs());
@@ -235,8 +233,8 @@ fn divide(a: ComplexNumber, b: ComplexNumber) -> ComplexNumber {
     ComplexNumber { parts: [(a_re * re + a_im * im) / square, (a_im * re - a_re * im) / square] }
 }
 
-/// `b` becomes `M⁻¹ b`, divided by its largest element; whether that is finite. Gauss elimination
-/// with partial pivoting.
+/// Replaces `b` by `M⁻¹ b`, divided by its largest element; returns whether that is finite.
+/// Gaussian elimination with partial pivoting.
 fn solve_scaled(matrix: &mut [ComplexNumber], b: &mut [ComplexNumber]) -> bool {
     let s = b.len();
     let size = |z: ComplexNumber| z.parts[0].abs() + z.parts[1].abs();

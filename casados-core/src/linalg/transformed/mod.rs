@@ -1,7 +1,7 @@
 //! Stages that share one Jacobian: smaller systems in the [eigenbasis](basis) of the tableau, its
-//! [decomposition], of [complex](complex) numbers. [Shared factors](shared_factor) of iterations
-//! that need not be exact are [solved](shared_solve) supernode by supernode; steps of variable size
-//! have [factors that are checked](checked_factor).
+//! [decomposition], and [complex](complex) numbers. [Shared factors](shared_factor) for Newton
+//! increments are [solved](shared_solve) supernode by supernode; adaptive integrators have
+//! [factors that are checked](checked_factor).
 
 pub mod basis;
 #[cfg(feature = "alloc")]

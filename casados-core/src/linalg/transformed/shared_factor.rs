@@ -1,6 +1,5 @@
-//! Factors of the shared Jacobian of the stages, in the eigenbasis of the tableau, of
-//! [demoted](Lanes::Demoted) numbers: increments that they give are corrected by the next iteration
-//! in any case.
+//! Factors of the shared Jacobian of the stages, in the eigenbasis of the tableau, in
+//! [demoted](Lanes::Demoted) precision: the next iteration corrects errors of the increments.
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
@@ -17,8 +16,8 @@ use crate::scalar::Lanes;
 use crate::shape::Aligned;
 use bytemuck::Zeroable;
 
-/// Factors of the shared Jacobian of the stages for all eigenvalues, by the plan: what an iteration
-/// takes that need not be exact.
+/// Factors of the shared Jacobian for all eigenvalues, by the plan; for Newton increments, which
+/// need not be exact.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
@@ -27,8 +26,8 @@ pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
-    /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
-    /// there for the `first_only` of stages that are alike, but not of a single lane.
+    /// Factorises; a vanishing pivot gives factors that are not finite. With `first_stage_only` the
+    /// Jacobian is given at the first stage of identical stages; this is ignored for a single lane.
     pub fn factor<F: Fallback>(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
@@ -47,8 +46,8 @@ impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
         factor::factor(plan, self.blocks.as_mut());
     }
 
-    /// Solves the Newton system of the stages: what is in the rows of the solution that belong to
-    /// kinematic states stays there.
+    /// Solves the Newton system of the stages. Rows of kinematic states in the solution remain
+    /// unchanged.
     pub fn solve<F: Fallback>(
         &mut self,
         basis: &Eigenbasis<E, S, S>,
@@ -64,7 +63,7 @@ impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     }
 }
 
-/// `Σ c f (hμ)^order` of the shared Jacobian, each block written once.
+/// Assembles `Σ c f (hμ)^order` of the shared Jacobian, each block written once.
 struct AssembleShared<'a, M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
@@ -99,7 +98,7 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
 struct SharedAssemblyRows<'a, M, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     plan: M,
     jacobian: &'a [[E; S]],
-    /// `hμ` and `(hμ)²` of what is added up.
+    /// `hμ` and `(hμ)²` times the weight of the mean.
     scales: [DemotedComplex<E, S>; 2],
     blocks: &'a mut [[[DemotedComplex<E, S>; 1]; 1]],
 }
@@ -128,7 +127,7 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> RowVisitor
         let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
         let [scale, square] = self.scales;
         let mut element = if entry.first { Complex::zero() } else { *to };
-        // An index that marks what is not there lies outside of the Jacobian.
+        // Absent entries have an index outside of the Jacobian.
         if let Some(mut value) = jacobian.get(entry.entry as usize).map(Self::sum_over_stages) {
             if let Some(minus_c) = jacobian.get(entry.by as usize) {
                 value = -(minus_c[0] * value);
@@ -141,7 +140,7 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> RowVisitor
         }
         *to = element;
     }
-    /// Fill.
+    /// Clears a block of fill-in.
     #[inline(always)]
     fn visit_simple(&mut self, row: usize) {
         factor::clear_fill::<M, DemotedComplex<E, S>, _>(self.plan, self.blocks, row, [[Complex::zero()]]);
@@ -149,7 +148,7 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> RowVisitor
 }
 
 impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> SharedAssemblyRows<'_, M, E, S, FIRST_ONLY> {
-    /// The mean is so much of what is added up.
+    /// Weight of each summand in the mean over the stages.
     const MEAN_WEIGHT: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
 
     /// The sum over the stages.

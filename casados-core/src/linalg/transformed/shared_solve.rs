@@ -1,8 +1,8 @@
-//! Solves by factors of the shared Jacobian, from equations to unknowns: what takes equations to
-//! the eigenbasis and unknowns back goes on while each row waits for the one before it.
+//! Triangular solves with the factors of the shared Jacobian. The transformations to and from the
+//! eigenbasis overlap with the substitution, in which each row waits for the preceding one.
 //!
-//! Supernode by supernode: an unknown that several rows ask for is looked up once for all of them,
-//! and what a row is made of stays in registers.
+//! The substitution is done supernode by supernode: an unknown is loaded once for all rows of a
+//! supernode, and their sums stay in registers.
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
@@ -17,14 +17,15 @@ use crate::model::Pivot;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
-/// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns.
+/// Transforms the residuals and solves with `I + L`; solves with `P + U` and transforms the
+/// solution back.
 pub struct SharedSolve<'a, M: Plan, E: Lanes, const S: usize> {
     pub plan: M,
     pub basis: &'a Eigenbasis<E, S, S>,
     pub f: &'a M::K<[E; S]>,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [DemotedComplex<E, S>],
-    /// Memory for a row of each slot.
+    /// Memory for one row per slot.
     pub rows: &'a mut [DemotedComplex<E, S>],
     pub solution: &'a mut M::K<[[E; 1]; S]>,
 }
@@ -47,10 +48,10 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for SharedSolve<'_, M, E, S> {
     }
 }
 
-/// Instructions for each block: two to fetch it, two products.
+/// Instructions per block: loads, and the two products of a complex number.
 const INSTRUCTIONS_PER_BLOCK: usize = 5;
 
-/// See [`Solve`].
+/// Forward substitution of [`SharedSolve`].
 struct ForwardSubstitution<'a, M, E: Lanes, const S: usize> {
     plan: M,
     basis: Eigenbasis<E, S, S>,
@@ -59,7 +60,7 @@ struct ForwardSubstitution<'a, M, E: Lanes, const S: usize> {
     rows: &'a mut [DemotedComplex<E, S>],
 }
 
-/// See [`Solve`].
+/// Back substitution of [`SharedSolve`].
 struct BackSubstitution<'a, M, E: Lanes, const S: usize> {
     plan: M,
     basis: Eigenbasis<E, S, S>,
@@ -79,7 +80,7 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for ForwardSubstitution
             }
         }
         for left in self.plan.structure().elimination.left.get(pivots[0].left()).unwrap_or_default() {
-            // Blocks of their rows lie one after the other.
+            // Blocks of the rows of a supernode are adjacent.
             let blocks = self.blocks.get(left.block as usize..).and_then(|blocks| blocks.first_chunk::<P>());
             let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize)) else { continue };
             for (sum, block) in sums.iter_mut().zip(blocks) {
@@ -89,7 +90,7 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for ForwardSubstitution
         for (index, pivot) in pivots.into_iter().enumerate() {
             let sum = sums[index];
             let below = self.blocks.get(pivot.block as usize..).unwrap_or_default();
-            // So many that the optimiser writes them one after the other.
+            // A constant range, which the optimiser unrolls.
             #[allow(clippy::needless_range_loop)]
             for other in index + 1..P {
                 if let Some(block) = below.get(other - index) {

@@ -1,5 +1,5 @@
-//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the
-//! integrator, `z = ζ(x, u, p)`.
+//! Algebraic states at nodes: functions of `(x, u, z)` depend on `(x, u)` through the integrator,
+//! `z = ζ(x, u, p)`.
 //!
 //! With `L = l + μᵀg` and `ν = ∂L/∂z`:
 //!
@@ -7,8 +7,7 @@
 //! ∇L = L_v + Zᵀν        ∇²L = [I; Z]ᵀ L'' [I; Z] + Σ_j ν_j ∇²ζ_j        v = (x, u), Z = ∂ζ/∂v
 //! ```
 //!
-//! The last term comes from the integrator, which is told `ν` for it, as it is told `π` for that of
-//! the dynamics.
+//! The integrator computes the last term from the weights `ν`, like that of the dynamics from `π`.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParametersView;
@@ -30,7 +29,7 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// Keeps what an interval says about the algebraic states at its start.
+/// Stores the algebraic states at the start of an interval, and their Jacobian.
 pub(in crate::ocp) fn store_interval<S: Shape, T: Real>(
     storage: &mut [T],
     free: FreeParametersView<'_>,
@@ -57,7 +56,7 @@ pub(in crate::ocp) fn store_interval<S: Shape, T: Real>(
     }
 }
 
-/// What was kept of a stage: nothing of the last one.
+/// The stored values and Jacobian of a stage; empty for the last stage.
 pub(in crate::ocp) fn values_and_jacobian<S: Shape, T>(
     storage: &[T],
     layout: Layout,
@@ -67,15 +66,15 @@ pub(in crate::ocp) fn values_and_jacobian<S: Shape, T>(
     part(storage, k * stage_len, stage_len).split_at_checked(S::NZ).unwrap_or_default()
 }
 
-/// Derivatives of a stage over `(x, u, z)`.
+/// Derivatives of a stage with respect to `(x, u, z)`.
 pub(in crate::ocp) struct ExtendedDerivatives<'a, T> {
     pub(in crate::ocp) terms: QuadraticTerms<'a, T>,
-    /// Of the constraints, `ld` apart as columns of the Hessian are.
+    /// Gradients of the constraints, at the same distance `ld` as columns of the Hessian.
     pub(in crate::ocp) columns: &'a mut [T],
 }
 
 impl<'a, T: Real> ExtendedDerivatives<'a, T> {
-    /// Zeros; nothing where there is no memory.
+    /// Derivatives of zero, in given memory.
     pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T], free: FreeParametersView<'a>) -> Self {
         memory.fill(T::ZERO);
         let [n, nz] = variable_and_algebraic_counts::<S>(free.count());
@@ -90,8 +89,8 @@ impl<'a, T: Real> ExtendedDerivatives<'a, T> {
         get(self.terms.hessian, i.min(j) * self.terms.ld + i.max(j))
     }
 
-    /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of
-    /// the constraints it is all there is.
+    /// Eliminates `z` by `dz`, the rows of `∂z/∂(x, u)`: adds the total derivatives to gradient and
+    /// Hessian with respect to `(x, u)`, and writes the gradients of the constraints.
     pub(in crate::ocp) fn eliminate_algebraic<S: Shape>(
         &self,
         dz: &[T],
@@ -108,7 +107,7 @@ impl<'a, T: Real> ExtendedDerivatives<'a, T> {
         for j in 0..n {
             to.add_gradient(j, total_derivative(&|i| get(self.terms.gradient, i), j));
             for i in j..n {
-                // Column j of `H [I; Z]`, and then row i of `[I Zᵀ]` times it.
+                // Column j of `H [I; Z]`, then row i of `[I Zᵀ]` times it.
                 let column = |row: usize| total_derivative(&|l| self.hessian(row, l), j);
                 to.add_hessian(i, j, total_derivative(&column, i));
             }
@@ -121,8 +120,9 @@ impl<'a, T: Real> ExtendedDerivatives<'a, T> {
         }
     }
 
-    /// Adds what parameters do through `z` as well: `dz` as in [`ExtendedDerivatives::fold`], `dp` the columns
-    /// of `∂z/∂p`, `direct` what they do over `(x, u, z)` where `z` stays, and `slopes` the rows of
+    /// Adds the derivatives with respect to parameters: `dz` as in
+    /// [`ExtendedDerivatives::eliminate_algebraic`], `dp` the columns of `∂z/∂p`, `direct` the
+    /// mixed derivatives with respect to `(x, u, z)` for constant `z`, and `slopes` the rows of
     /// `∂g/∂p`.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn eliminate_algebraic_for_parameters<S: Shape>(
@@ -168,9 +168,9 @@ impl<'a, T: Real> ExtendedDerivatives<'a, T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states
-    /// themselves are simulated for them, where they are not known from a line search. Nothing
-    /// where nothing depends on these.
+    /// Computes the weights `ν` of second derivatives of algebraic states, for [`interval_nodes`].
+    /// Simulates the algebraic states unless the line search has done so. Does nothing if no
+    /// function depends on them.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]

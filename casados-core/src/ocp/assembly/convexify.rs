@@ -1,17 +1,17 @@
-//! Hessians of stages made positive definite, each for itself: what the Riccati recursion needs
-//! keeps its structure.
+//! Convexification of the Hessians of stages, each separately: the structure for the Riccati
+//! recursion is unchanged.
 
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::qp::part_mut;
 use crate::scalar::Real;
 
-/// Eigenvalues are at least this, relative to the largest element.
+/// The smallest eigenvalue, relative to the largest element.
 const MIN_RELATIVE_EIGENVALUE: f64 = 1e-6;
-/// Sweeps of Jacobi's method; it converges quadratically.
+/// The largest number of sweeps of Jacobi's method, which converges quadratically.
 const MAX_JACOBI_SWEEPS: usize = 30;
 
-/// Makes a matrix positive definite, whose lower triangle lies column after column, `ld` apart.
-/// `scratch` has room for two such matrices and a vector.
+/// Makes a matrix positive definite, given by the columns of its lower triangle at a distance of
+/// `ld`. `scratch` has memory for two such matrices and a vector.
 pub(in crate::ocp) fn convexify<T: Real>(
     method: Convexification,
     h: &mut [T],
@@ -36,8 +36,7 @@ pub(in crate::ocp) fn convexify<T: Real>(
     }
     if method == Convexification::LevenbergMarquardt {
         let mut shift = min_eigenvalue;
-        // The shift cannot be more than the sum of a row, which `n` times the largest element
-        // bounds.
+        // The shift is at most the sum of a row, and therefore `n` times the largest element.
         while !is_shifted_positive_definite(h, ld, n, min_eigenvalue, shift, work) {
             shift = shift * T::from_f64(4.0);
             if !shift.is_finite() {
@@ -100,7 +99,8 @@ fn is_positive_definite<T: Real>(h: &[T], ld: usize, n: usize, min_eigenvalue: T
     is_shifted_positive_definite(h, ld, n, min_eigenvalue, T::ZERO, work)
 }
 
-/// Whether the pivots of Cholesky's factorisation of `H + shift I` are no smaller than that.
+/// Whether the pivots of the Cholesky factorisation of `H + shift I` exceed half of
+/// `min_eigenvalue`.
 fn is_shifted_positive_definite<T: Real>(
     h: &[T],
     ld: usize,
@@ -116,8 +116,8 @@ fn is_shifted_positive_definite<T: Real>(
     }
     for k in 0..n {
         let pivot = get(work, ld, k, k);
-        // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for
-        // rounding.
+        // A pivot is at least the smallest eigenvalue; the factor of a half allows for rounding
+        // errors.
         let pivot_is_positive = pivot > T::from_f64(0.5) * min_eigenvalue;
         if !pivot_is_positive {
             return false;
@@ -138,7 +138,7 @@ fn is_shifted_positive_definite<T: Real>(
     true
 }
 
-/// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its
+/// Jacobi's method: diagonalises a symmetric matrix by rotations. The columns of `vectors` are its
 /// eigenvectors.
 pub(in crate::ocp) fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
     let relative_tolerance = T::from_f64(T::EPSILON);
@@ -201,7 +201,7 @@ mod tests {
     const N: usize = 5;
     const LD: usize = 8;
 
-    /// Symmetric, with eigenvalues that are known.
+    /// A symmetric matrix with given eigenvalues.
     fn symmetric_matrix(values: [f64; N]) -> SMatrix<f64, N, N> {
         let a = SMatrix::<f64, N, N>::from_fn(|i, j| ((3 * i + 7 * j * j + 1) as f64).sin());
         let q = a.qr().q();
@@ -209,7 +209,7 @@ mod tests {
     }
 
     fn convexified(method: Convexification, a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
-        // What is not the lower triangle must not be read.
+        // Elements outside the lower triangle must not be read.
         let mut h = [f64::NAN; N * LD];
         for j in 0..N {
             for i in j..N {
@@ -221,7 +221,7 @@ mod tests {
         SMatrix::from_fn(|i, j| h[i.min(j) * LD + i.max(j)])
     }
 
-    /// Rotations of 5×5 matrices of size 4: some hundred roundings of 1e-15.
+    /// Rounding errors of rotations of 5×5 matrices of size 4: some hundred times 1e-15.
     const TOLERANCE: f64 = 1e-13;
 
     #[test]
@@ -229,7 +229,7 @@ mod tests {
         let a = symmetric_matrix([4.0, 3.0, 2.0, 1.0, 0.5]);
         for method in [Convexification::Project, Convexification::Mirror, Convexification::LevenbergMarquardt]
         {
-            // Both triangles of what was given: it is symmetric but for rounding.
+            // The given matrix is symmetric up to rounding errors.
             let lower = SMatrix::<f64, N, N>::from_fn(|i, j| a[(i.max(j), i.min(j))]);
             assert_eq!(convexified(method, &a), lower);
         }
@@ -246,7 +246,7 @@ mod tests {
         assert!((convexified(Convexification::Mirror, &a) - mirrored).amax() < TOLERANCE);
         let shifted = convexified(Convexification::LevenbergMarquardt, &a) - a;
         let shift = shifted[(0, 0)];
-        // As large as it takes, and not four times that.
+        // The shift is at most four times as large as required.
         assert!(shift > 2.0 && shift < 4.0 * 2.1);
         assert!((shifted - SMatrix::identity() * shift).amax() < TOLERANCE);
         assert!((convexified(Convexification::None, &a) - a).amax() < TOLERANCE);

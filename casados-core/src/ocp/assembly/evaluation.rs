@@ -1,4 +1,4 @@
-//! What there is at the iterate of a problem, whatever it is.
+//! Linearisation, evaluation and residuals of a problem.
 
 use crate::ocp::assembly::kkt;
 use crate::ocp::formulation::error::OcpError;
@@ -9,7 +9,7 @@ use crate::qp::{Residuals, Solution, StageDims, nan_max};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
+    /// Writes the QP at the iterate. Its solution is the full step of sequential quadratic
     /// programming.
     ///
     /// # Errors
@@ -18,8 +18,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         P::linearise(self, curvature)
     }
 
-    /// The objective at some point, without penalties; and what is left of its dynamics and
-    /// constraints in `ends`: `φ` of every interval, then `g` of every stage.
+    /// Returns the objective at a point, without penalties. Writes `φ` of every interval, then `g`
+    /// of every stage, to `ends_and_constraints`.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -31,18 +31,18 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         P::evaluate(self, trial_point, ends_and_constraints)
     }
 
-    /// How many numbers `φ` of every interval and `g` of every stage are.
+    /// The number of values of `φ` of all intervals and `g` of all stages.
     pub(crate) fn ends(&self) -> usize {
         ends(self.qp.dims())
     }
 
-    /// How well the iterate satisfies the conditions of optimality of the problem, and the
-    /// objective with penalties of soft bounds; after [`Ocp::linearise`].
+    /// Returns the residuals of the optimality conditions at the iterate, and the objective with
+    /// penalties of soft bounds. [`Ocp::linearise`] must have been called.
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let (mut residuals, penalties) = kkt::residuals(qp.view(), iterate, scratch);
-        if P::LIFTED {
+        if self.problem.is_lifted() {
             let [_, largest_stage_residual] = self.stage_residuals;
             residuals.dynamics = nan_max(residuals.dynamics, largest_stage_residual.to_f64());
         }

@@ -1,4 +1,4 @@
-//! Copies of elements of the first state, which boundary conditions have at the last stage.
+//! Copies of elements of the first state, for boundary conditions at the last stage.
 
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::problem::Formulation;
@@ -7,8 +7,8 @@ use crate::qp::element::{get, set};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// What links copies of elements of the first state to it, `x₀[i] − w`, behind the path
-/// constraints: values and columns, which are zero at other stages.
+/// Writes the constraints `x₀[i] − w = 0` of the copies, after the path constraints: values and
+/// gradients, which are zero at other stages.
 pub(in crate::ocp) fn link_initial_state_copies<P: Formulation<T>, T: Real>(
     at: &SolutionStage<'_, T>,
     stage: usize,

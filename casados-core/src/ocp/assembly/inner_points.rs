@@ -1,7 +1,7 @@
-//! Constraints at points inside of intervals, in the QP.
+//! Constraints at points inside intervals, in the QP.
 //!
-//! What is there depends on `(x_j, w, u, z_j)`, and through the pieces before on `(x, w, u)`, with
-//! `M = ∂(x_j, w, u, z_j)/∂(x, w, u)`:
+//! Functions at a point depend on `(x_j, w, u, z_j)`, and through the preceding pieces on
+//! `(x, w, u)`, with `M = ∂(x_j, w, u, z_j)/∂(x, w, u)`:
 //!
 //! ```text
 //! ∇g = Mᵀ ∇g_j        ∇² = Mᵀ ∇²(μᵀg_j) M, and what pieces add
@@ -47,7 +47,7 @@ impl<T: Real> InnerPoints<T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// As `linearise_intervals`, piece by piece.
+    /// Linearises the intervals piece by piece, like `linearise_intervals`.
     pub(super) fn linearise_pieces<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -95,7 +95,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok((objective, [T::ZERO; 2]))
     }
 
-    /// Simulates all pieces at some point, and shows the intervals.
+    /// Simulates all pieces at a point, and visits the intervals.
     ///
     /// # Errors
     /// [`OcpError::Integration`], [`OcpError::Unsupported`]
@@ -120,7 +120,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// What constraints at points add to multipliers and weights there.
+    /// Computes the multipliers and weights of constraints at points.
     fn update_point_weights(&mut self) -> Result<(), OcpError> {
         let layout @ Layout { intervals, .. } = self.layout();
         let free = self.free.view();
@@ -200,29 +200,29 @@ fn stage_stride<S: Shape, T>(layout: Layout) -> usize {
     crate::qp::padded_len::<T>(stage_variable_count::<S>(layout.free_count))
 }
 
-/// Where rows of a stage are written.
+/// The rows of a stage that are written.
 pub(super) struct ConstraintRows<'a, 'b, 'c, T> {
     pub values: &'a mut [T],
-    /// Columns of their derivatives, and the distance of these; none where values are enough.
+    /// Gradients of the rows, and their distance; empty if only values are required.
     pub columns: &'a mut [T],
     pub ld: usize,
-    /// Gradient and Hessian, where they are asked for.
+    /// Gradient and Hessian, if required.
     pub terms: Option<&'a mut QuadraticTerms<'c, T>>,
     /// `μ` of all rows, if the Hessian is exact.
     pub mu: &'a [T],
     pub stage: SolutionStage<'b, T>,
-    /// The number of the stage.
+    /// The index of the stage.
     pub k: usize,
 }
 
 impl<'a, 'b, T: Real> ConstraintRows<'a, 'b, '_, T> {
-    /// Values alone.
+    /// Rows without derivatives.
     pub fn without_derivatives(values: &'a mut [T], stage: SolutionStage<'b, T>, k: usize) -> Self {
         Self { values, columns: &mut [], ld: 0, terms: None, mu: &[], stage, k }
     }
 }
 
-/// Costs of a stage, which are at points too where controls are held.
+/// Costs of a stage, which are evaluated at points too if controls are piecewise constant.
 pub(super) struct PointCost<'a, C, T> {
     pub cost: &'a mut C,
     pub reference: &'a [T],
@@ -231,12 +231,12 @@ pub(super) struct PointCost<'a, C, T> {
 }
 
 impl<T: Real> InnerPoints<T> {
-    /// The part of the interval from a point to the next one.
+    /// The fraction of the interval from a point to the next one.
     fn fraction_to_next(&self, point: usize) -> T {
         self.fraction(point + 1) - self.fraction(point)
     }
 
-    /// What is given at a point.
+    /// Time and parameters at a point.
     fn point_node<'a, P: Formulation<T>>(
         &self,
         k: usize,
@@ -248,7 +248,8 @@ impl<T: Real> InnerPoints<T> {
         Node { time, p: part(p, k * np, np), reference: &[], factor: T::ONE }
     }
 
-    /// Writes the rows of a stage, with `z` and `∂z/∂(x, w, u)` at its node; costs at points.
+    /// Writes the rows of a stage, with `z` and `∂z/∂(x, w, u)` at its node. Returns the costs at
+    /// points.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -313,7 +314,8 @@ impl<T: Real> InnerPoints<T> {
 }
 
 impl<T: Real> PointSolution<'_, T> {
-    /// The derivative of a state, or behind these of an algebraic one, by one of `(x, w, u)`.
+    /// The derivative of a state, or of an algebraic state (index after the states), with respect
+    /// to an element of `(x, w, u)`.
     fn derivative<S: Shape>(&self, variable: usize, input: usize, free: FreeParametersView<'_>) -> T {
         let Some(column) = model_input::<S>(input, free) else { return T::ZERO };
         match variable.checked_sub(S::NX) {
@@ -323,7 +325,7 @@ impl<T: Real> PointSolution<'_, T> {
     }
 }
 
-/// Which of `(x, u, p)` a variable in `(x, w, u)` is; copies of the first state are none of these.
+/// The index in `(x, u, p)` of a variable in `(x, w, u)`; `None` for copies of the first state.
 fn model_input<S: Shape>(variable: usize, free: FreeParametersView<'_>) -> Option<usize> {
     let Some(index_after_states) = variable.checked_sub(S::NX) else { return Some(variable) };
     match index_after_states.checked_sub(free.count()) {
@@ -332,11 +334,11 @@ fn model_input<S: Shape>(variable: usize, free: FreeParametersView<'_>) -> Optio
     }
 }
 
-/// Costs at a point, and the factor that they have there.
+/// Costs at a point, and their factor.
 type PointCostAndFactor<'a, 'c, C, T> = Option<(&'a mut PointCost<'c, C, T>, T)>;
 
 impl<T: Real> ConstraintRows<'_, '_, '_, T> {
-    /// The path constraints at a point, from a row on, and costs there.
+    /// Writes the path constraints at a point, starting at a row, and returns the costs there.
     #[allow(clippy::type_complexity)]
     fn write_point<P: Formulation<T>>(
         &mut self,
@@ -358,7 +360,7 @@ impl<T: Real> ConstraintRows<'_, '_, '_, T> {
         };
         let (n, nx) = (stage_variable_count::<P::Shape>(free.count()), P::Shape::NX);
         let (ld, dependent) = (n + P::Shape::NZ, nx + P::Shape::NZ);
-        // Where the states and the algebraic states of the point are in `(x, w, u, z)`.
+        // The index in `(x, w, u, z)` of states and algebraic states of the point.
         let extended_index = |variable: usize| if variable < nx { variable } else { n + variable - nx };
         let derivative = |variable: usize, a: usize| solution.derivative::<P::Shape>(variable, a, free);
         let mut point_derivatives = ExtendedDerivatives::new::<P::Shape>(extended, free);
@@ -389,7 +391,7 @@ impl<T: Real> ConstraintRows<'_, '_, '_, T> {
                 &mut point_derivatives.terms,
             )?;
             if let Some(w) = end {
-                // Nothing else has a gradient here.
+                // No other term has a gradient here.
                 let zeros = part_mut(product, 0, ld);
                 zeros.fill(T::ZERO);
                 point_derivatives.terms.add_duration_derivatives(
@@ -407,7 +409,7 @@ impl<T: Real> ConstraintRows<'_, '_, '_, T> {
             });
             terms.add_gradient(a, gradient_element);
         }
-        // Columns of `H M`, and then rows of `Mᵀ` times these.
+        // Columns of `H M`, then rows of `Mᵀ` times these.
         for (a, product) in product.chunks_exact_mut(ld).enumerate().take(n) {
             for (i, to) in product.iter_mut().enumerate() {
                 let direct = if a < nx { T::ZERO } else { point_derivatives.hessian(i, a) };

@@ -1,5 +1,5 @@
-//! The conditions of optimality at a point: those of the problem where the QP was written at this
-//! point.
+//! Residuals of the optimality conditions at the point where the QP was written: those of the
+//! problem.
 
 use crate::qp::{
     Columns, QpView, Residuals, Solution, StageDims, add_transposed, bound_residuals, copy_common, dot,
@@ -8,9 +8,9 @@ use crate::qp::{
 };
 use crate::scalar::{Packed, Real, Registers, compiled};
 
-/// The residuals, and penalties of soft bounds. Residuals as in
-/// [`qp::residuals`](crate::qp::residuals), which goes element by element and needs no scratch,
-/// here with room for three vectors over `(x, u)`.
+/// Returns the residuals, and the penalties of soft bounds. The residuals are those of
+/// [`qp::residuals`](crate::qp::residuals), which computes them by elements and without scratch
+/// memory; `scratch` has memory for three vectors over `(x, u)`.
 pub(in crate::ocp) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
@@ -26,7 +26,7 @@ pub(in crate::ocp) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + 
     result
 }
 
-/// A point that others own.
+/// A point in borrowed memory.
 type BorrowedSolution<'a, T> = Solution<T, &'a [StageDims], &'a [T]>;
 
 /// See [`residuals`].
@@ -71,7 +71,7 @@ fn compute_residuals<T: Real, E: Packed<T>>(
         let Some(point) = stages.next() else { break };
         let next = stages.peek().map_or(&[][..], |next| next.x);
         let view = stage.arrays();
-        // What is padding is zero.
+        // Padding is zero.
         let (n, ld) = (view.n, view.ld);
         let v = part(all, stage_start, ld);
         stage_start += ld;
@@ -85,7 +85,7 @@ fn compute_residuals<T: Real, E: Packed<T>>(
         for &gap in &*gap {
             update_max(&mut residuals.dynamics, gap);
         }
-        // The gradient with another sign.
+        // The negative gradient.
         copy_common(sum, view.gradient);
         symmetric::<T, E>(sum, view.hessian, ld, v, n);
         scale::<T, E>(sum, -T::ONE);
@@ -102,7 +102,7 @@ fn compute_residuals<T: Real, E: Packed<T>>(
         let nx = point.x.len();
         for (i, ((&sum, &upper), &lower)) in sum.iter().zip(upper).zip(lower).enumerate() {
             let residual = sum + lower - upper;
-            // Of variables that are one the sum counts.
+            // Coupled variables have the sum of their stationarity residuals.
             let is_coupled = match i.checked_sub(nx) {
                 None => (k == 0 || k == last) && is_marked(periodic, i),
                 Some(j) => is_marked(shared, j),
@@ -126,7 +126,7 @@ fn compute_residuals<T: Real, E: Packed<T>>(
     (residuals, penalties)
 }
 
-/// Residuals of variables that are one, from the sums of their gradients.
+/// Residuals of coupled variables, from the sums of their gradients.
 fn coupled_residuals<T: Real>(
     qp: QpView<'_, T>,
     iterate: &BorrowedSolution<'_, T>,
@@ -147,7 +147,7 @@ fn coupled_residuals<T: Real>(
     }
 }
 
-/// The larger size; NaN stays.
+/// The larger absolute value; NaN propagates.
 #[inline(always)]
 pub(in crate::ocp) fn update_max<T: Real>(largest: &mut f64, value: T) {
     *largest = nan_max(*largest, value.abs().to_f64());

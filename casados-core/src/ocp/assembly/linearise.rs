@@ -28,7 +28,7 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// [`Ocp::linearise`], and shows every interval to `watch`.
+    /// [`Ocp::linearise`], which also passes every interval to `observer`.
     pub(in crate::ocp) fn linearise_with_observer<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -55,8 +55,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Dynamics and integral costs, all intervals in one call: each goes `to` its stage, with its
-    /// start. The sums of their costs, and of what lifted stages have left.
+    /// Linearises dynamics and integral costs of all intervals in one call, and passes each
+    /// interval with its stage and the variables at its start to `visit`. Returns the sum of the
+    /// costs, and the residuals of lifted stages.
     pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -94,7 +95,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok((objective, left))
     }
 
-    /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
+    /// Adds the arrival cost to the QP, with its gradient at zero, or `at_iterate`.
     pub(in crate::ocp) fn add_arrival_cost(&mut self, at_iterate: bool) {
         let layout = self.layout();
         let data = split_data::<P, T>(self.data.as_mut(), layout);
@@ -102,7 +103,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         arrival::add_to_qp(data.arrival, x0, &mut self.qp);
     }
 
-    /// The objective at the iterate, of intervals and `costs` at nodes.
+    /// Stores the objective at the iterate: the sum of intervals and of `costs` at nodes.
     pub(in crate::ocp) fn store_objective(&mut self, (objective, stages): IntervalSums<T>, costs: T) {
         let layout = self.layout();
         let data = split_data::<P, T>(self.data.as_mut(), layout);
@@ -110,8 +111,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.stage_residuals = stages;
     }
 
-    /// Costs and constraints at nodes, stage by stage, added to Hessians and gradients with which
-    /// each `begin`s; the costs. Where stages have nothing else, they are `plain`.
+    /// Adds costs and constraints at nodes, stage by stage, to Hessians and gradients with the
+    /// values of `initialise`. Returns the costs. Stages without other terms have
+    /// `has_node_costs_only`.
     pub(in crate::ocp) fn linearise_functions<C: Curvature<P::Dynamics, T>>(
         &mut self,
         has_node_costs_only: bool,
@@ -142,7 +144,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             } else {
                 &[]
             };
-            // Where there are algebraic states, over them too.
+            // With algebraic states, derivatives with respect to them as well.
             let is_extended = !z.is_empty();
             let mut extended = ExtendedDerivatives::new::<P::Shape>(
                 if is_extended { &mut *data.extended } else { &mut [] },
@@ -154,19 +156,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             } else {
                 (&mut direct, &mut *columns, ld)
             };
-            // Values lie where the lower bounds are written afterwards.
+            // Values are stored where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
             let count = if k < intervals { path_row_count::<P, T>(layout) } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
-            // Of a running cost the end time is a factor.
+            // A running cost has the end time as a factor.
             let end_time_index = free.end_time_index().filter(|_| *running && k < intervals);
             let duration = if end_time_index.is_some() { free.duration(stage_point.u) } else { T::ONE };
             let factor = duration * node.factor * if *running && k < intervals { first_part } else { T::ONE };
             let cost_context = CostContext { stage: k, factor, exact: C::EXACT, model_origin: from };
             let constraint_context =
                 ConstraintContext::new(k, free, part(stage_point.u, 0, P::Terminal::INITIAL_STATE_COPIES));
-            // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
+            // `μ = λ_upper − λ_lower`, stored where the upper bounds are written afterwards.
             let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
             for ((mu, &upper), &lower) in mu.iter_mut().zip(stage_point.g_upper).zip(stage_point.g_lower) {
                 *mu = upper - lower;
@@ -252,8 +254,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(objective)
     }
 
-    /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
-    /// complete.
+    /// Completes the gradients of the QP, `∇f − H v`, and convexifies Hessians, in all stages whose
+    /// costs have not done so.
     fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, has_node_costs_only: bool) {
         let layout @ Layout { intervals, .. } = self.layout();
         let Self { qp, iterate, data, .. } = self;
@@ -282,7 +284,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
+    /// Replaces the objective of the QP at the iterate `v̄` by `½ (v − v̄)ᵀ H (v − v̄)`.
     pub(in crate::ocp) fn centre_objective_at_iterate(&mut self) {
         let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
@@ -311,16 +313,16 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
     }
 }
 
-/// The costs of all intervals, and what is left of the equations of lifted stages.
+/// The costs of all intervals, and the residuals of lifted stages.
 type IntervalSums<T> = (T, [T; 2]);
 
-/// Whether costs at a node write the gradient of the QP themselves, where nothing else is there.
+/// Whether costs at a node write the gradient of the QP themselves, if there are no other terms.
 fn writes_qp_gradient<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
     let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
     convex && z.is_empty()
 }
 
-/// Bounds of what is linear, `lg − g + [C D] v`, where the values `g` are.
+/// Writes the bounds of the linearised constraints, `lg − g + [C D] v`, in place of the values `g`.
 pub(super) fn shift_limits<T: Real>(
     columns: &[T],
     [n, ld]: [usize; 2],

@@ -12,21 +12,21 @@ use crate::scalar::{Packed, Real, Registers, compiled};
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// More lanes than any register has.
+/// An upper limit of the lanes of all registers.
 const MAX_LANES: usize = 16;
 
-/// So many rows are copied element by element.
+/// The largest number of remaining rows that are copied element by element.
 const MAX_SCALAR_ROWS: usize = 2;
 
-/// `[A B]ᵀ`, a column for each next state, and `x₊ − A x − B u`.
+/// The linearised dynamics: `[A B]ᵀ`, a column for each next state, and `x₊ − A x − B u`.
 pub(in crate::ocp) struct LinearisedInterval<'a, T> {
-    /// `A` and `B`, column after column.
+    /// `A` and `B` by columns.
     pub columns: [&'a [T]; 2],
     /// `x₊`
     pub end_state: &'a [T],
-    /// `(x, u)`, and zeros to the length of a column.
+    /// `(x, u)`, padded with zeros to the length of a column.
     pub point: &'a [T],
-    /// Columns `ld` apart.
+    /// `[A B]ᵀ`, with columns at a distance of `ld`.
     pub matrix: &'a mut [T],
     pub ld: usize,
     pub offset: &'a mut [T],
@@ -49,7 +49,7 @@ impl<T: Real> Registers<T> for LinearisedInterval<'_, T> {
         let Self { columns: [a, b], end_state: next, point, matrix, ld, offset } = self;
         let nx = next.len();
         let n = nx + b.len() / nx.max(1);
-        // Element `i` of column `j` of `[A B]`, and what follows.
+        // Column `j` of `[A B]` from element `i` on.
         let column_from_row = |i: usize, j: usize| {
             let (columns, j) = if j < nx { (a, j) } else { (b, j - nx) };
             columns.get(j * nx + i..).unwrap_or_default()
@@ -59,13 +59,13 @@ impl<T: Real> Registers<T> for LinearisedInterval<'_, T> {
         let mut tile: [E::Cell; MAX_LANES] = Zeroable::zeroed();
         let Some(tile) = tile.get_mut(..E::LANES) else { return };
         for i in (0..end).step_by(E::LANES) {
-            // The last rows together with some that are written a second time.
+            // The last rows are written together with some rows that were written before.
             let i = i.min(nx - E::LANES);
             let Some(next) = E::cells(part(next, i, E::LANES)).first() else { return };
             let mut sum = E::load(next);
             for j in (0..n).step_by(E::LANES) {
                 let mut columns = [E::from_f64(0.0); MAX_LANES];
-                // As many as the optimiser knows.
+                // A constant count for the optimiser.
                 for (l, column) in columns.iter_mut().enumerate().take(E::LANES) {
                     if j + l < n
                         && let Some(cell) = E::cells(part(column_from_row(i, j + l), 0, E::LANES)).first()
@@ -78,7 +78,7 @@ impl<T: Real> Registers<T> for LinearisedInterval<'_, T> {
                 E::transpose(&columns[..E::LANES], tile);
                 let rows = matrix.get_mut(i * ld..).unwrap_or_default().chunks_mut(ld.max(1));
                 for (row, from) in rows.zip(&*tile) {
-                    // Zeros go where there are zeros.
+                    // Padding is overwritten with zeros.
                     if let Some(to) = E::cells_mut(part_mut(row, j, E::LANES)).first_mut() {
                         *to = *from;
                     }
@@ -102,12 +102,12 @@ impl<T: Real> Registers<T> for LinearisedInterval<'_, T> {
     }
 }
 
-/// What intervals have left in the QP.
+/// Which terms of the QP the intervals have.
 pub(in crate::ocp) struct IntervalContributions {
-    /// Whether Hessians are those of costs at nodes alone.
+    /// Whether Hessians consist of costs at nodes only.
     pub has_node_costs_only: bool,
-    /// Whether they add to costs: all of them do, or none. Then these are cleared where those at
-    /// nodes are added.
+    /// Whether intervals add to costs, either all or none. If not, costs at nodes clear gradient
+    /// and Hessian first.
     pub adds_to_costs: bool,
 }
 
@@ -145,7 +145,8 @@ impl IntervalContributions {
     }
 }
 
-/// As [`LinearisedInterval`], with the derivatives by free parameters between those by states and controls.
+/// Writes a [`LinearisedInterval`] with derivatives with respect to free parameters between those
+/// of states and controls.
 fn write_with_free_parameters<T: Real>(
     step: &IntervalResult<'_, T>,
     free: FreeParametersView<'_>,
@@ -176,7 +177,7 @@ mod tests {
     use alloc::vec;
     use alloc::vec::Vec;
 
-    /// In integers, of which all sums are exact.
+    /// Numbers are integers, so that all sums are exact.
     #[test]
     fn linearised_intervals_of_every_size() {
         for (nx, nu) in (1..20).flat_map(|nx| [0, 1, 3, 8].map(|nu| (nx, nu))) {

@@ -1,5 +1,5 @@
-//! The QP at an iterate: derivatives of intervals and functions, curvature, units, and the
-//! conditions of optimality.
+//! The QP at an iterate: derivatives of intervals and functions, convexification, units, and
+//! residuals of the optimality conditions.
 
 pub(in crate::ocp) mod algebraic;
 pub(in crate::ocp) mod convexify;

@@ -1,18 +1,18 @@
-//! Intervals that are integrated in pieces, from point to point, with the derivatives of all that
-//! is there.
+//! Integration of intervals in pieces, from point to point, with derivatives.
 //!
 //! ```text
 //! x_{j+1} = φ_j(x_j, u, p)        D_{j+1} = ∂φ_j/∂x D_j + ∂φ_j/∂(u, p)
 //! ```
 //!
-//! Second derivatives go back over the pieces. With the multipliers `λ_j` of the end of a piece,
-//! and what constraints at its start add, `f_j = ∂(μᵀg_j)/∂x` and `ν_j = ∂(μᵀg_j)/∂z`:
+//! Second derivatives are computed backward over the pieces. With the multipliers `λ_j` of the end
+//! of a piece, and the contributions of constraints at its start, `f_j = ∂(μᵀg_j)/∂x` and
+//! `ν_j = ∂(μᵀg_j)/∂z`:
 //!
 //! ```text
 //! H += M_jᵀ ∇²(λ_{j+1}ᵀφ_j + ν_jᵀζ_j) M_j        λ_j = (∂φ_j/∂x)ᵀ λ_{j+1} + (∂ζ_j/∂x)ᵀ ν_j + f_j
 //! ```
 //!
-//! `M_j` is `D_j` above the identity of `(u, p)`.
+//! `M_j` is `D_j` stacked on the identity of `(u, p)`.
 
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
@@ -22,7 +22,7 @@ use crate::qp::element::get;
 use crate::qp::{copy_common, part, part_mut};
 use crate::scalar::Real;
 
-/// What integrates a piece of all intervals.
+/// Integrates one piece of all intervals.
 pub(in crate::ocp) type PieceIntegrator<'a, T> =
     &'a mut dyn FnMut(&Nodes<'_, T>, Sink<'_, T>) -> Result<(), OcpError>;
 
@@ -35,10 +35,10 @@ pub(in crate::ocp) struct PiecewiseIntegration<'a, T> {
 }
 
 impl<T: Real> PiecewiseIntegration<'_, T> {
-    /// All pieces at these nodes, with first derivatives or without.
+    /// Integrates all pieces at these nodes, with or without first derivatives.
     ///
     /// # Errors
-    /// Those of what integrates.
+    /// The errors of the integrator.
     pub fn forward(
         &mut self,
         nodes: &Nodes<'_, T>,
@@ -97,11 +97,11 @@ impl<T: Real> PiecewiseIntegration<'_, T> {
         Ok(())
     }
 
-    /// Second derivatives, where first ones are known: with weights of the algebraic states at
-    /// nodes, and weights and forces at points in memory.
+    /// Computes second derivatives from the stored first ones, with weights of the algebraic states
+    /// at nodes, and the stored weights and constraint gradients at points.
     ///
     /// # Errors
-    /// Those of what integrates.
+    /// The errors of the integrator.
     pub fn backward(&mut self, nodes: &Nodes<'_, T>, call: PieceIntegrator<'_, T>) -> Result<(), OcpError> {
         let Self { sizes, fractions: parts, memory } = self;
         let (sizes, [nx, _, _, nz], n) = (*sizes, sizes.dims, nodes.len());
@@ -117,7 +117,7 @@ impl<T: Real> PiecewiseIntegration<'_, T> {
         } = &mut **memory;
         copy_common(of_ends, nodes.multipliers);
         for k in 0..n {
-            // Blocks of integral costs are those of Gauss and Newton.
+            // The present Hessian blocks of integral costs are Gauss-Newton blocks.
             part_mut(totals, k * sizes.sums_len(), sizes.sums_len())
                 .iter_mut()
                 .skip(1 + sizes.inputs())
@@ -166,7 +166,7 @@ impl<T: Real> PiecewiseIntegration<'_, T> {
         Ok(())
     }
 
-    /// Shows the intervals as if they had been integrated at once.
+    /// Visits the intervals as if they had been integrated in one piece.
     pub fn visit_intervals(
         &self,
         intervals: usize,
@@ -214,7 +214,7 @@ impl<T: Real> PiecewiseIntegration<'_, T> {
     }
 }
 
-/// Nodes as the first places: `∂x/∂(x₀, u, p)` is the identity.
+/// Initialises the first points with the nodes: `∂x/∂(x₀, u, p)` is the identity.
 fn initialise_nodes<T: Real>(sizes: PieceSizes, found: &mut [T], nodes: &Nodes<'_, T>) {
     let [nx, _, _, nz] = sizes.dims;
     for (k, interval) in nodes.iter().enumerate() {
@@ -231,7 +231,7 @@ fn chain_square<T: Real>(rows: usize, d: &[T], of_step: [&[T]; 3], to: &mut [T])
     chain_rule([rows, rows], d, of_step, to);
 }
 
-/// `A D + (0, B, P)`, of so many rows; `D` has `nx` of them.
+/// `A D + (0, B, P)` with the given number of rows; `D` has `nx` rows.
 fn chain_rule<T: Real>([rows, nx]: [usize; 2], d: &[T], [a, b, p]: [&[T]; 3], to: &mut [T]) {
     let inputs = b.chunks_exact(rows.max(1)).chain(p.chunks_exact(rows.max(1)));
     let mut inputs = inputs.map(Some);
@@ -246,8 +246,8 @@ fn chain_rule<T: Real>([rows, nx]: [usize; 2], d: &[T], [a, b, p]: [&[T]; 3], to
     }
 }
 
-/// Adds `Mᵀ H M` to the blocks of an interval, of the blocks `H` of a piece; nothing if these are
-/// empty.
+/// Adds `Mᵀ H M` to the blocks of an interval, for the blocks `H` of a piece. Does nothing if they
+/// are empty.
 fn add_congruence<T: Real>(
     sizes: PieceSizes,
     d: &[T],

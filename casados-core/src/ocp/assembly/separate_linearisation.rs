@@ -1,5 +1,4 @@
-//! What is asked of a problem that is handed to others: to solvers of nonlinear programs, or as a
-//! solution.
+//! Linearisation for external solvers of nonlinear programs, and constraint values of solutions.
 
 use crate::ocp::assembly::algebraic;
 use crate::ocp::assembly::inner_points::{ConstraintRows, PointCost};
@@ -22,11 +21,12 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Derivatives at the iterate: those of intervals go to `watch`, those of costs and constraints
-    /// to the QP, with `∇f` as its gradient. `clear` makes zero what the Hessian of a stage has.
+    /// Linearises at the iterate: passes derivatives of intervals to `observer`, and writes those
+    /// of costs and constraints to the QP, with `∇f` as its gradient. `clear_hessian` sets the
+    /// Hessian of a stage to zero.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`].
+    /// The errors of [`Ocp::linearise`].
     #[cfg(feature = "casadi")]
     pub(crate) fn linearise_separately<C: Curvature<P::Dynamics, T>>(
         &mut self,
@@ -43,7 +43,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             curvature,
             |k, step, (Arrays { ld, hessian, gradient, .. }, free), _| {
                 observer(k, step);
-                // The Hessian of what is integrated along is in that of the interval.
+                // The Hessian of the quadrature is part of the interval's Hessian.
                 let (mut terms, slopes) =
                     (QuadraticTerms { free, gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
                 slopes.enumerate().for_each(|(i, &slope)| terms.add_gradient(i, slope));
@@ -55,8 +55,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Where algebraic states and points inside are those of the iterate: `g` of every stage in
-    /// `values`, and after [`Ocp::linearise`] the objective without penalties.
+    /// Writes `g` of every stage to `values`. Returns the objective without penalties, which is
+    /// current after [`Ocp::linearise`]. Algebraic states and points inside intervals must be those
+    /// of the iterate.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]

@@ -1,5 +1,5 @@
-//! A point that is tried: its objective, what is left of its dynamics and constraints, and the QP
-//! that has these exactly.
+//! Trial points: objective, ends of intervals and constraints; and the QP of a second-order
+//! correction.
 
 use crate::linalg::dot;
 use crate::ocp::assembly::algebraic;
@@ -22,9 +22,8 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The objective at some point, without penalties; and what is left of its dynamics and
-    /// constraints in `ends`: `φ` of every interval, then `g` of every stage, in the layout of
-    /// [`Ocp::ends`].
+    /// Returns the objective at a point, without penalties. Writes `φ` of every interval, then `g`
+    /// of every stage, to `ends_and_constraints`, in the layout of [`Ocp::ends`].
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -115,8 +114,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Constants of the linearised dynamics and constraints such that these are exact at some
-    /// point, whose `ends` are given: what a second-order correction solves.
+    /// Second-order correction: sets the constants of the linearised dynamics and constraints so
+    /// that these are exact at a point with the given `ends`.
     pub(in crate::ocp) fn set_second_order_correction(
         &mut self,
         trial_point: &Solution<T, D, M>,

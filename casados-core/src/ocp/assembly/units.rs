@@ -1,7 +1,7 @@
-//! Units in which sizes are near one: of forces by the objective, of variables by guess and bounds,
-//! of constraints by their gradients.
+//! Units in which sizes are near one: of the objective by its derivatives, of variables by guess
+//! and bounds, of constraints by their gradients.
 //!
-//! Iterates stay in the units of the problem. A constant of an algorithm is one in these units.
+//! Iterates remain in the units of the problem; constants of algorithms are multiples of units.
 //!
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.8.
 
@@ -9,46 +9,49 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_initial_state_fixed};
-use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, copy_common, is_marked, part, part_mut};
+use crate::qp::{
+    Bounds, QpView, StageDims, StageOffsetsIter, add_symmetric, copy_common, is_marked, part, part_mut,
+};
 use crate::scalar::Real;
 use core::ops::Range as Stages;
 
-/// No unit is larger, or smaller than its inverse: squares of units are numbers.
+/// The largest unit; its inverse is the smallest one. Squares of units are finite.
 const MAX_UNIT: f64 = 1e12;
-/// Tolerances are those of the problem where units are up to this or its inverse.
+/// Units between this and its inverse are replaced by one, and leave tolerances unchanged.
 pub(in crate::ocp) const NEAR_ONE_RATIO: f64 = 100.0;
 
-/// Beside the unit of forces at the guess a smaller one cannot be met where this many rounding
-/// errors of it are more than what has to be met.
+/// The reduced objective unit is at least the previous one times this number of rounding errors
+/// over the tolerance.
 const ROUNDING_ERROR_MARGIN: f64 = 10.0;
-/// So many times the distance of two numbers are the last digits of a sum of some.
+/// The rounding error of a sum, in multiples of the unit roundoff times the largest term.
 const SUM_ROUNDING_FACTOR: f64 = 4.0;
-/// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
+/// IPOPT's `nlp_upper_bound_inf`: larger bounds are no measure of the size of variables.
 const BOUND_INFINITY: f64 = 1e19;
 
-/// What is known of all units.
+/// The objective unit, and the smallest unit of a row.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct ProblemScaling {
-    /// The unit of forces.
+    /// The unit of the objective and of multipliers.
     pub objective_unit: f64,
-    /// The least unit of a row, at most one.
-    pub min_row_unit: f64,
+    /// The smallest unit of a row, at most one.
+    pub tolerance: f64,
 }
 
 /// The units of a problem.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct ScalingUnits<'a, T> {
     pub scaling: ProblemScaling,
-    /// Those of variables and constraints.
+    /// The units of variables and constraints.
     pub rows: &'a [T],
 }
 
-/// What a tolerance is multiplied by: the unit, but one from there to a hundredth of it.
+/// The factor of a tolerance: the unit if it is below one, one up to a unit of 100, and a hundredth
+/// of larger units.
 pub(in crate::ocp) fn tolerance_factor(unit: f64) -> f64 {
     unit.min(1.0).max(unit / NEAR_ONE_RATIO)
 }
 
-/// The least and the largest of the sizes that something may have.
+/// The smallest and the largest magnitude of a quantity.
 #[derive(Clone, Copy)]
 struct MagnitudeRange {
     smallest: f64,
@@ -58,7 +61,7 @@ struct MagnitudeRange {
 impl MagnitudeRange {
     const EMPTY: Self = Self { smallest: f64::INFINITY, largest: 0.0 };
 
-    /// Zeros and infinite bounds say nothing.
+    /// Adds a magnitude; zeros and infinite bounds are ignored.
     fn add<T: Real>(&mut self, size: T) {
         let size = size.abs().to_f64();
         if size > 0.0 && size.is_finite() {
@@ -66,14 +69,14 @@ impl MagnitudeRange {
         }
     }
 
-    /// The number between least and most that is nearest to one; one where nothing is known.
+    /// The number in the range that is nearest to one; one for an empty range.
     fn unit<T: Real>(&self) -> T {
         let Self { smallest: least, largest: most } = *self;
         let unit = if most == 0.0 { 1.0 } else { least.max(most.min(1.0)) };
         T::from_f64(unit.clamp(1.0 / MAX_UNIT, MAX_UNIT))
     }
 
-    /// The same; one where that is between a hundredth and a hundred.
+    /// The unit, replaced by one between 1/100 and 100.
     fn unit_unless_near_one<T: Real>(&self) -> T {
         let unit = self.unit::<T>();
         let wide = T::from_f64(NEAR_ONE_RATIO);
@@ -82,10 +85,10 @@ impl MagnitudeRange {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// All units at the iterate, where the QP was written without second derivatives of
+    /// Computes all units at the iterate, where the QP was written without second derivatives of
     /// constraints.
     ///
-    /// With a number for each row, and scratch over the variables of a stage.
+    /// `rows` receives a unit for each row; `scratch` has memory for the variables of a stage.
     pub(in crate::ocp) fn compute_units(&self, rows: &mut [T], scratch: &mut [T]) -> ProblemScaling {
         rows.fill(T::ONE);
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
@@ -94,7 +97,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let (path, terminal) = (span.start..last, last..span.end);
             let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
             for i in 0..nx + nu {
-                // Controls of the last stage are those that all stages share, or others.
+                // Shared controls have one unit over all stages, other controls of the last stage
+                // their own.
                 let is_single_variable = i < nx || is_marked(qp.shared(), i - nx);
                 let stages = if is_single_variable { span.clone() } else { path.clone() };
                 set_variable_unit(qp, v, (stages, i), rows);
@@ -111,13 +115,13 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         let force = compute_objective_unit(qp, v, rows, scratch);
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
-        ProblemScaling { objective_unit: force, min_row_unit: least.to_f64() }
+        ProblemScaling { objective_unit: force, tolerance: least.to_f64() }
     }
 
-    /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
-    /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
-    /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
-    /// residual in units of forces that is asked for.
+    /// Returns a smaller objective unit if objective and gradient at the iterate are below a
+    /// hundredth of the present one. For example, a cost `(x − r)²` with a large `r` is large at
+    /// the guess, and small at a solution nearby. `rows` are the units of rows, `min_row_unit` is
+    /// the smallest tolerance of residuals in units of the objective.
     pub(in crate::ocp) fn reduced_objective_unit(
         &self,
         rows: &[T],
@@ -132,14 +136,14 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         (smaller_unit * NEAR_ONE_RATIO < objective_unit).then_some(smaller_unit)
     }
 
-    /// The largest size of variables and of their bounds, at least one.
+    /// The largest magnitude of variables and their bounds, at least one.
     pub(in crate::ocp) fn largest_magnitude(&self) -> f64 {
         let mut largest =
             self.iterate.variables_and_costates().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
         for stage in self.qp().stages() {
             for bounds in [stage.x_bounds(), stage.u_bounds()] {
                 for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
-                    // What is fixed is as large as that.
+                    // Fixed variables count, however large.
                     let infinity = if lower == upper { f64::INFINITY } else { BOUND_INFINITY };
                     let sizes = [lower, upper].map(|bound| bound.abs().to_f64());
                     largest = sizes.into_iter().filter(|&size| size < infinity).fold(largest, f64::max);
@@ -149,8 +153,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         largest
     }
 
-    /// What rounding leaves of gaps, and of distances to bounds: the last digits of the largest
-    /// variable of the iterate, moved into its bounds.
+    /// The rounding error of gaps, and of distances from bounds: a multiple of the unit roundoff
+    /// times the largest variable of the iterate, projected onto its bounds.
     pub(in crate::ocp) fn gap_rounding_error(&self) -> f64 {
         let mut largest = T::ZERO;
         for (stage, stage_point) in self.qp().stages().zip(self.iterate.stages()) {
@@ -165,7 +169,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 }
 
-/// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
+/// Computes the unit of a variable over all stages, from its guess and bounds; one if it is near
 /// one.
 fn set_variable_unit<T: Real>(
     qp: QpView<'_, T>,
@@ -176,19 +180,20 @@ fn set_variable_unit<T: Real>(
     let mut range = MagnitudeRange::EMPTY;
     let mut guess = T::ZERO;
     let variable_places =
-        || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
+        || StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
     let stages_of_places = qp.stages().skip(stages.start);
     for (place, stage) in variable_places().zip(stages_of_places) {
         guess = guess.max(at(v, (place.v + i) as u32).abs());
         let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
         let Bounds { lower, upper, .. } = bounds;
         lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
-        // Where zero is says nothing: of a temperature between 298 and 398 it is the room.
+        // The distance between two bounds does not depend on an offset, as in temperatures from 298
+        // to 398.
         if let (Some(&lower), Some(&upper)) = (lower.get(i), upper.get(i)) {
             range.add(upper - lower);
         }
     }
-    // Small guesses are as good as zero.
+    // Guesses below one do not reduce a unit that no bound determines.
     if range.largest > 0.0 || guess > T::ONE {
         range.add(guess);
     }
@@ -198,12 +203,13 @@ fn set_variable_unit<T: Real>(
     }
 }
 
-/// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
+/// Computes the unit of a constraint over stages, from its gradients and its distance from its
+/// bounds.
 fn set_row_unit<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>, usize), units: &mut [T]) {
     let mut range = MagnitudeRange::EMPTY;
     let (mut largest_gradient, mut bound_distance) = (T::ZERO, T::ZERO);
     for (place, stage) in
-        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
+        StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
     {
         let view = stage.arrays();
         let column = part(view.matrix, (place.next + i) * place.ld, place.ld);
@@ -225,14 +231,14 @@ fn set_row_unit<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>
     range.add(largest_gradient);
     range.add(bound_distance);
     let unit = range.unit_unless_near_one();
-    for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
+    for place in StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
         set(units, place.row + place.ld + i, unit);
     }
 }
 
-/// The unit of forces: of the largest derivative of the objective by a variable, or what that
-/// changes by where the variable changes by a unit or by its size. At many guesses gradients
-/// vanish.
+/// Computes the objective unit: the largest derivative of the objective with respect to a variable
+/// in its unit, or the change of this derivative if the variable changes by its unit or its
+/// magnitude. At many guesses gradients vanish.
 fn compute_objective_unit<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
     let [slope, change] = largest_gradient_and_change(qp, v, rows, scratch);
     let mut range = MagnitudeRange::EMPTY;
@@ -240,10 +246,10 @@ fn compute_objective_unit<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scrat
     range.unit::<T>().to_f64()
 }
 
-/// Both of them, with units of rows.
+/// Returns the largest gradient and its largest change, with units of rows.
 fn largest_gradient_and_change<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
     let ([mut largest_gradient, mut largest_change], fixed) = ([T::ZERO; 2], is_initial_state_fixed(qp));
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
         copy_common(gradient, part(view.gradient, 0, place.ld));

@@ -1,4 +1,4 @@
-//! Derivatives of all instances.
+//! Derivatives of all instances of a batch.
 
 use super::gradients::Gradients;
 use super::{BatchOcp, Worker, reset_list};
@@ -18,18 +18,19 @@ where
     S: OcpSolver<P, T>,
     T: Real,
 {
-    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀`, `λᵀ dw/dp` and `λᵀ dw/dr` of each
-    /// instance, by initial state, parameters and references, as [`SolutionFactors::adjoint`] and
-    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) have them. `seed`
-    /// writes the `λ` of an instance over states and controls, all zero before, from its number and
-    /// its solution: the gradient of a loss.
+    /// Computes adjoint derivatives of all solutions: `λᵀ dw/dx₀`, `λᵀ dw/dp` and `λᵀ dw/dr` of
+    /// each instance, by initial state, parameters and references, as [`SolutionFactors::adjoint`]
+    /// and [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) do. `seed` writes
+    /// the `λ` of an instance over states and controls, which are zero before, from the index and
+    /// the solution of the instance: the gradient of a loss.
     ///
-    /// A linearisation and a factorisation for each instance, however many parameters there are.
-    /// An instance whose last run did not end at a solution has no derivatives, and says so; before
-    /// the first run all iterates count as solutions.
+    /// Each instance takes one linearisation and one factorisation, for any number of parameters.
+    /// An instance whose last run did not end at a solution has an error instead; before the first
+    /// run all iterates count as solutions.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]: nothing was computed. Errors of an instance are in its place.
+    /// [`OcpError::OutOfMemory`]: nothing was computed. The errors of instances are among the
+    /// gradients.
     ///
     /// # Example
     /// ```
@@ -72,9 +73,9 @@ where
         })
     }
 
-    /// Gradients of all optimal values: `∂V/∂x₀`, `∂V/∂p` and `∂V/∂r` of each instance, as
-    /// [`SolutionFactors::value_gradient_x0`] and `value_gradient_p` have them. The Hessian has no
-    /// part in them: that of Gauss and Newton costs least.
+    /// Computes the gradients of all optimal values: `∂V/∂x₀`, `∂V/∂p` and `∂V/∂r` of each
+    /// instance, as [`SolutionFactors::value_gradient_x0`] and `value_gradient_p` do. They do not
+    /// depend on the Hessian; the Gauss-Newton Hessian is the cheapest.
     ///
     /// # Errors
     /// As [`BatchOcp::adjoint`].
@@ -89,7 +90,7 @@ where
         })
     }
 
-    /// Factorises each instance at its solution, and asks the factors.
+    /// Factorises each instance at its solution, and computes a gradient by the factors.
     #[allow(clippy::type_complexity)]
     fn gradients<C: Curvature<P::Dynamics, T> + Sync>(
         &mut self,
@@ -124,12 +125,12 @@ where
         Ok(gradients.view())
     }
 
-    /// Derivatives of all solutions by initial states and parameters, and gains, as
-    /// [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) has them: the status of each
-    /// instance. [`BatchOcp::sensitivities`] has the derivatives.
+    /// Computes the derivatives of all solutions by initial states and parameters, and the feedback
+    /// gains, as [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) does. Returns the status of
+    /// each instance; [`BatchOcp::sensitivities`] has the derivatives.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]: nothing was computed. Errors of an instance are in its place.
+    /// [`OcpError::OutOfMemory`]: nothing was computed. The errors of instances are their statuses.
     ///
     /// # Example
     /// ```
@@ -170,7 +171,8 @@ where
         Ok(statuses)
     }
 
-    /// The derivatives of the last [`BatchOcp::differentiate`]; none of an instance that has none.
+    /// Returns the derivatives of the last [`BatchOcp::differentiate`]; none for an instance that
+    /// failed.
     #[must_use]
     pub fn sensitivities(&self, instance: usize) -> Option<&Sensitivities<T>> {
         self.statuses.get(instance)?.as_ref().ok()?;
@@ -178,7 +180,7 @@ where
     }
 }
 
-/// Whether the iterate of an instance is a solution, as far as anybody has said.
+/// Checks that the last run of an instance, if there was one, ended at a solution.
 fn check_solved(outcomes: &[Result<Outcome, OcpError>], instance: usize) -> Result<(), OcpError> {
     match outcomes.get(instance) {
         Some(Err(error)) => Err(*error),

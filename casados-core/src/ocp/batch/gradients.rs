@@ -1,4 +1,4 @@
-//! Gradients of all instances.
+//! Gradients of all instances of a batch.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::problem::Formulation;
@@ -8,7 +8,7 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// A gradient of an instance: `λᵀ dw/d·` of its solution `w`, or `∂V/d·` of its value.
+/// A gradient of an instance: `λᵀ dw/d·` of its solution `w`, or `∂V/d·` of its optimal value.
 ///
 /// ```
 /// # use casados::ocp::{BatchOcp, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -31,16 +31,16 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Gradient<'a, T> {
-    /// By the initial state, `NX`; zero where it is free.
+    /// By the initial state, `NX`; zero if it is free.
     pub x0: &'a [T],
-    /// By the parameters, `NP`, which change at all stages together.
+    /// By the parameters, `NP`, changed at all stages together.
     pub p: &'a [T],
-    /// By the references of all stages, one after the other, and then of the terminal cost, as
-    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) has it.
+    /// By the references of all stages in order, followed by that of the terminal cost, as in
+    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references).
     pub references: &'a [T],
 }
 
-/// The gradients of all instances, or why there is none.
+/// The gradients of all instances, or their errors.
 ///
 /// ```
 /// # use casados::ocp::{BatchOcp, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -67,11 +67,11 @@ pub struct Gradients<'a, T> {
 }
 
 impl<'a, T: Real> Gradients<'a, T> {
-    /// That of an instance.
+    /// Returns the gradient of an instance.
     ///
     /// # Errors
-    /// [`OcpError::NoSolution`] where the last run of the instance did not end at a solution, or
-    /// the error that it ended with, or where there is no such instance; those of
+    /// [`OcpError::NoSolution`] if the last run of the instance did not end at a solution, or if
+    /// there is no such instance; the error of that run; those of
     /// [`Ocp::factorise`](crate::ocp::Ocp::factorise).
     pub fn get(&self, instance: usize) -> Result<Gradient<'a, T>, OcpError> {
         let GradientMemory { dims: [nx, np, nr], x0, p, references, statuses } = self.memory;
@@ -83,17 +83,17 @@ impl<'a, T: Real> Gradients<'a, T> {
         })
     }
 
-    /// All of them.
+    /// Returns the gradients of all instances.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Result<Gradient<'a, T>, OcpError>> + use<'a, T> {
         let all = *self;
         (0..self.memory.statuses.len()).map(move |instance| all.get(instance))
     }
 }
 
-/// Where they are.
+/// The memory of the gradients.
 #[derive(Clone, Debug)]
 pub struct GradientMemory<T> {
-    /// `NX`, `NP`, and how many references there are.
+    /// `NX`, `NP`, and the number of references.
     dims: [usize; 3],
     x0: Vec<T>,
     p: Vec<T>,
@@ -101,17 +101,18 @@ pub struct GradientMemory<T> {
     statuses: Vec<Result<(), OcpError>>,
 }
 
-/// The status and the three gradients of an instance.
+/// The status and the gradients by `x0`, `p` and references of an instance.
 type InstanceGradients<'a, T> = (&'a mut Result<(), OcpError>, [&'a mut [T]; 3]);
 
 impl<T: Real> GradientMemory<T> {
-    /// Of no instance.
+    /// Memory for zero instances.
     pub fn new<P: Formulation<T>>(intervals: usize) -> Self {
         let dims = [P::Shape::NX, P::Shape::NP, references::reference_count::<P, T>(intervals)];
         Self { dims, x0: Vec::new(), p: Vec::new(), references: Vec::new(), statuses: Vec::new() }
     }
 
-    /// Room for as many instances: the status and the three gradients of each.
+    /// Resizes the memory to this number of instances; returns the status and the three gradients
+    /// of each.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -130,7 +131,7 @@ impl<T: Real> GradientMemory<T> {
         }))
     }
 
-    /// To be read.
+    /// Returns a view of the gradients.
     pub fn view(&self) -> Gradients<'_, T> {
         Gradients { memory: self }
     }

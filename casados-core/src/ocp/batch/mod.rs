@@ -1,10 +1,10 @@
-//! Many problems of one formulation at once, solved and differentiated.
+//! Batches: many problems of one formulation, solved and differentiated in threads.
 //!
 //! | | |
 //! | --- | --- |
-//! | `real_time` | real-time iterations of many plants |
-//! | `derivatives` | adjoints, gradients of values and forward derivatives of all |
-//! | `gradients` | what adjoints and gradients of values are |
+//! | `real_time` | real-time iterations for many plants |
+//! | `derivatives` | adjoint derivatives, gradients of optimal values, forward derivatives |
+//! | `gradients` | the memory of adjoint derivatives and gradients |
 
 mod derivatives;
 mod gradients;
@@ -26,20 +26,20 @@ use alloc::vec::Vec;
 use gradients::GradientMemory;
 
 /// Many problems of one formulation, each with its own initial state, parameters, references,
-/// bounds, guess, outcome and derivatives: for learning the weights of a controller, runs with
-/// uncertain parameters, many starts.
+/// bounds, guess, outcome and derivatives: to learn the weights of a controller, for scenarios with
+/// uncertain parameters, or for multi-start.
 ///
-/// The instances are problems as any other: what is different about each is said to itself. With
-/// the feature `parallel` they are shared among the threads of rayon, and each thread takes the
-/// next instance when it is free. Iterates and outcomes are those of single solves to the bit,
-/// whatever the number of threads; an instance that fails says so by itself, and leaves the others
-/// as they are. Memory is allocated by [`BatchOcp::new`] and by the first call of a kind.
+/// Each instance is an [`Ocp`](crate::ocp::Ocp); set its data there. With the feature `parallel`
+/// the threads of rayon share the instances: each thread takes the next instance when it is idle.
+/// Iterates and outcomes are bitwise those of single solves, for any number of threads. A failed
+/// instance has an error as its outcome, and does not affect the others. [`BatchOcp::new`] and the
+/// first call of each kind allocate memory.
 ///
-/// `S` is the solver: [`HeapSqp`], [`HeapIpm`](crate::ocp::HeapIpm), or an [`OcpSolver`] of one's
-/// own.
+/// `S` is the solver: [`HeapSqp`], [`HeapIpm`](crate::ocp::HeapIpm), or a user-defined
+/// [`OcpSolver`].
 ///
 /// # Example
-/// A mass is pushed towards zero, from many places.
+/// A mass is pushed towards zero from many initial positions.
 /// ```
 /// use casados::ocp::{BatchOcp, Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
 /// use casados::prelude::*;
@@ -72,26 +72,26 @@ use gradients::GradientMemory;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct BatchOcp<P, S = HeapSqp, T = f64> {
-    /// How many threads share the instances at most; as many as rayon has by default.
+    /// The maximum number of threads; by default that of rayon.
     pub threads: usize,
-    /// The barrier parameter of smoothed derivatives, see
-    /// [`SolutionFactors::smoothing`]; zero by default.
+    /// The barrier parameter of smoothed derivatives, see [`SolutionFactors::smoothing`]. Default
+    /// 0.
     pub smoothing: T,
     instances: Vec<HeapOcp<P, T>>,
     outcomes: Vec<Result<Outcome, OcpError>>,
-    /// One for each thread.
+    /// A worker for each thread.
     workers: Vec<Worker<S, T>>,
     gradient_memory: GradientMemory<T>,
-    /// Of every instance; none until they are asked for.
+    /// The derivatives of every instance; empty before the first [`BatchOcp::differentiate`].
     sensitivities: Vec<Sensitivities<T>>,
     statuses: Vec<Result<(), OcpError>>,
 }
 
-/// What a thread works with.
+/// The solver and the memory of a thread.
 #[derive(Clone)]
 struct Worker<S, T> {
     solver: S,
-    /// Factors of a solution, and a seed, if derivatives were asked for.
+    /// Factors of a solution, and a seed; none before the first adjoint derivatives.
     adjoint: Option<(SolutionFactors<T>, HeapSolution<T>)>,
 }
 
@@ -101,7 +101,7 @@ where
     S: OcpSolver<P, T>,
     T: Real,
 {
-    /// As many instances as that of a problem, with its bounds, data and iterate, and a solver.
+    /// Creates `count` instances with the bounds, data and iterate of a problem, and a solver.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -123,18 +123,18 @@ where
         })
     }
 
-    /// The instances, to be looked at: their iterates are the solutions.
+    /// Returns the instances; their iterates are the solutions.
     #[must_use]
     pub fn instances(&self) -> &[HeapOcp<P, T>] {
         &self.instances
     }
 
-    /// The instances, to be changed: initial states, parameters, references, bounds, guesses.
+    /// Returns the instances, to change initial states, parameters, references, bounds and guesses.
     pub fn instances_mut(&mut self) -> &mut [HeapOcp<P, T>] {
         &mut self.instances
     }
 
-    /// Changes the solver: its options, for all instances.
+    /// Changes the solver and its options, for all instances.
     ///
     /// ```
     /// # use casados::ocp::{BatchOcp, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -156,11 +156,11 @@ where
         self.workers.iter_mut().map(|worker| &mut worker.solver).for_each(change);
     }
 
-    /// Solves all instances, each from its own iterate: the outcome of each, as a single solve has
-    /// it.
+    /// Solves all instances, each from its own iterate. Returns the outcome of each, as of a single
+    /// solve.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]: nothing was solved. Errors of an instance are its outcome.
+    /// [`OcpError::OutOfMemory`]: nothing was solved. The errors of instances are their outcomes.
     pub fn solve(&mut self) -> Result<&[Result<Outcome, OcpError>], OcpError> {
         let threads = self.prepare_workers()?;
         reset_list(&mut self.outcomes, self.instances.len(), || Ok(Outcome::new()))?;
@@ -171,12 +171,12 @@ where
         Ok(&self.outcomes)
     }
 
-    /// The outcomes of the last [`BatchOcp::solve`]; empty before the first one.
+    /// Returns the outcomes of the last [`BatchOcp::solve`]; empty before the first one.
     pub fn outcomes(&self) -> &[Result<Outcome, OcpError>] {
         &self.outcomes
     }
 
-    /// The number of workers: one for each thread.
+    /// Returns the number of workers, one for each thread, after creating missing ones.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -192,7 +192,7 @@ where
     }
 }
 
-/// As many as that, all new.
+/// Resets a list to `count` new values.
 fn reset_list<V>(list: &mut Vec<V>, count: usize, value: impl FnMut() -> V) -> Result<(), OcpError> {
     list.clear();
     try_reserve(list, count)?;

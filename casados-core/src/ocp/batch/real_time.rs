@@ -1,4 +1,4 @@
-//! Real-time iterations of many plants.
+//! Real-time iterations for many plants.
 
 use super::reset_list;
 use crate::ocp::feedback::real_time::HeapRealTime;
@@ -11,8 +11,8 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// Real-time iterations of many plants at once: a [`HeapRealTime`] for each, with its own plan,
-/// references and parameters, shared among the threads of rayon (feature `parallel`).
+/// Real-time iterations for many plants at once: a [`HeapRealTime`] for each, with its own plan,
+/// references and parameters, in the threads of rayon (feature `parallel`).
 ///
 /// ```
 /// use casados::ocp::{BatchRealTime, Horizon, LeastSquaresCost, Map, Problem};
@@ -42,12 +42,12 @@ use alloc::vec::Vec;
 pub struct BatchRealTime<P: Formulation<T>, C = GaussNewton, T: Real = f64> {
     controllers: Vec<HeapRealTime<P, HeapInteriorPoint<T>, C, T>>,
     statuses: Vec<Result<(), OcpError>>,
-    /// The controls of all plants, one after the other.
+    /// The controls of all plants, in order.
     u: Vec<T>,
     thread_slots: Vec<()>,
 }
 
-/// QPs that wait for the states; see [`BatchRealTime`].
+/// Prepared QPs, before the feedback phase; see [`BatchRealTime`].
 ///
 /// ```
 /// # use casados::ocp::{BatchRealTime, Horizon, LeastSquaresCost, Map, Problem};
@@ -72,8 +72,8 @@ pub struct BatchPrepared<'a, P: Formulation<T>, C, T: Real> {
 }
 
 impl<P: Formulation<T> + Clone, T: Real> BatchRealTime<P, GaussNewton, T> {
-    /// As many controllers for a problem whose iterate is the first plan, with the Hessian of Gauss
-    /// and Newton.
+    /// Creates `count` controllers for a problem whose iterate is the first plan, with the
+    /// Gauss-Newton Hessian.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -96,7 +96,7 @@ where
     P: Formulation<T>,
     T: Real,
 {
-    /// The same with another Hessian, as [`Exact`](crate::ocp::Exact).
+    /// Changes the Hessian, for example to [`Exact`](crate::ocp::Exact).
     #[must_use]
     pub fn with_curvature<N: Copy>(self, curvature: N) -> BatchRealTime<P, N, T> {
         let Self { controllers, statuses, u, thread_slots: threads } = self;
@@ -104,13 +104,13 @@ where
         BatchRealTime { controllers, statuses, u, thread_slots: threads }
     }
 
-    /// The controllers, to be changed: references, parameters and plans by
+    /// Returns the controllers, to change references, parameters and plans by
     /// [`RealTime::ocp_mut`](crate::ocp::RealTime::ocp_mut).
     pub fn controllers_mut(&mut self) -> &mut [HeapRealTime<P, HeapInteriorPoint<T>, C, T>] {
         &mut self.controllers
     }
 
-    /// What became of each plant in the last call.
+    /// Returns the status of each plant after the last call.
     pub fn statuses(&self) -> &[Result<(), OcpError>] {
         &self.statuses
     }
@@ -123,7 +123,7 @@ where
     T: Real,
 {
     /// The preparation phase of all plants: linearises each problem at its plan. A plant whose
-    /// problem has no linearisation has no feedback in this sample.
+    /// linearisation fails has no feedback in this sample.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -136,7 +136,7 @@ where
         Ok(BatchPrepared { batch: self })
     }
 
-    /// All plans one interval earlier, for the next sample.
+    /// Shifts all plans by one interval, for the next sample.
     pub fn shift(&mut self) {
         self.controllers.iter_mut().for_each(HeapRealTime::shift);
     }
@@ -148,12 +148,13 @@ where
     C: Curvature<P::Dynamics, T> + Send,
     T: Real,
 {
-    /// The feedback phase of all plants: solves each QP with its state, of which `x` has one after
-    /// the other. The controls of all plants, one after the other; a plant without a feedback keeps
-    /// the control before, zero at first, and [`BatchRealTime::statuses`] says why.
+    /// The feedback phase of all plants: solves each QP with its state; `x` has the states of all
+    /// plants in order. Returns the controls of all plants in the same order. A plant without
+    /// feedback keeps its last control, initially zero, and [`BatchRealTime::statuses`] has its
+    /// error.
     ///
     /// # Errors
-    /// [`OcpError::Length`] if there are other than `NX` numbers for each plant.
+    /// [`OcpError::Length`] unless `x` has `NX` elements for each plant.
     pub fn feedback(self, x: &[T]) -> Result<&'a [T], OcpError> {
         let (nx, nu) = (P::Shape::NX, P::Shape::NU);
         let BatchRealTime { controllers, statuses, u, thread_slots: threads } = self.batch;

@@ -1,4 +1,4 @@
-//! Integrators of single intervals inside of these.
+//! Dense output of integrators of single intervals.
 
 use crate::error::Error;
 use crate::memory::Memory;
@@ -10,15 +10,16 @@ use crate::scalar::Real;
 use crate::shape::Matrix;
 use crate::{erk, irk};
 
-/// What takes the states and algebraic states at a part of an interval.
+/// Receives an index, and the states and algebraic states at this fraction of an interval.
 pub(in crate::ocp) type StateVisitor<'a, T> = &'a mut dyn FnMut(usize, &[T], &[T]);
 
-/// An integrator that knows its solution inside of an interval.
+/// An integrator with dense output inside an interval.
 pub(in crate::ocp) trait DenseOutput<T>: IntervalSetup<T> {
-    /// States and algebraic states at parts of an interval that was begun.
+    /// Evaluates states and algebraic states at fractions of an interval, after
+    /// [`IntervalSetup::begin`].
     ///
     /// # Errors
-    /// Those of the integrator.
+    /// The errors of the integrator.
     fn states_at_fractions(
         &mut self,
         interval: &Interval<'_, T>,
@@ -27,7 +28,7 @@ pub(in crate::ocp) trait DenseOutput<T>: IntervalSetup<T> {
     ) -> Result<(), Error>;
 }
 
-/// By the collocation polynomial; by shorter intervals, where the tableau has none.
+/// By the collocation polynomial, or, for tableaux without one, by integrating shorter intervals.
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> DenseOutput<T> for irk::Integrator<M, B, S, T, W> {
     fn states_at_fractions(
         &mut self,
@@ -68,7 +69,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> DenseOutput<T> for erk::Inte
     }
 }
 
-/// All intervals, one after the other.
+/// Evaluates states and algebraic states at fractions of all intervals, one interval after the
+/// other.
 ///
 /// # Errors
 /// [`OcpError::Integration`]

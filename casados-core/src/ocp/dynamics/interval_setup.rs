@@ -1,5 +1,4 @@
-//! What an integrator of single intervals is told before each, and what it says of one without a
-//! result.
+//! Setup of an integrator before each single interval, and conversion of its errors.
 
 use crate::error::Error;
 use crate::integrator::Integrator;
@@ -9,7 +8,7 @@ use crate::ocp::formulation::functions::dynamics::{Interval, IntervalResult, Nod
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// What an integrator is told before an interval.
+/// Sets parameters and time of an integrator before an interval.
 pub(in crate::ocp) trait IntervalSetup<T> {
     fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error>;
 }
@@ -23,7 +22,7 @@ impl<T: Real, I: Integrator<Number = T>> IntervalSetup<T> for I {
     }
 }
 
-/// All intervals, one after the other, with the state and the control of each.
+/// Evaluates all intervals, one after the other, each at its state and control.
 ///
 /// # Errors
 /// [`OcpError::Integration`]
@@ -45,10 +44,10 @@ pub(in crate::ocp) fn each<M: Dae, T: Real, D>(
     Ok(())
 }
 
-/// The result of an interval.
+/// Converts the result of an integrator to the result of an interval.
 ///
 /// # Errors
 /// [`OcpError::Integration`]
 pub(in crate::ocp) fn in_interval<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
-    result.map_err(|error| OcpError::Integration { interval, error })
+    result.map_err(|error| OcpError::Integration { interval, error, phase: None })
 }

@@ -15,7 +15,8 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
-/// `x_{k+1} = y(x_k, u_k, p_k, t_k)`: a [`Function`] with as many outputs as there are states.
+/// `x_{k+1} = y(x_k, u_k, p_k, t_k)`: discrete-time dynamics by a [`Function`] with an output for
+/// each state.
 ///
 /// ```
 /// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem};

@@ -1,4 +1,4 @@
-//! The end of a period, seen from the start of the next one.
+//! A map after the last interval, from the end of a period to the start of the next.
 
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::linalg::dot;
@@ -15,19 +15,19 @@ use bytemuck::Zeroable;
 use core::fmt;
 
 /// Dynamics whose last interval ends with a map of the state: `x_N = g(φ(x_{N−1}, u_{N−1}))`, where
-/// `φ` are the dynamics `D` and `g` is a [`Function`] of the states alone, with an output for each.
+/// `φ` is the dynamics `D` and `g` is a [`Function`] of the states only, with an output for each.
 ///
-/// With [`Ocp::periodic`](crate::ocp::Ocp::periodic) an orbit is periodic up to that map: a turn of
-/// the frame, a phase that grows by `2π` in a period, half a period of what is symmetric, an
-/// impact. States, bounds and costs at the last node are those after the map; a state before it is
-/// that of the solution within the last interval.
+/// With [`Ocp::periodic`](crate::ocp::Ocp::periodic) an orbit is periodic up to this map: a
+/// rotation of the frame, a phase that grows by `2π` in a period, half a period of a symmetric
+/// motion, an impact. States, bounds and costs at the last node are those after the map; dense
+/// output inside the last interval is before the map.
 ///
-/// First and second derivatives are exact: `g′ φ′`, and with the multipliers `π` of the last state
-/// `φ′ᵀ ∇²(πᵀg) φ′` beside the second derivatives of `φ` along `g′ᵀπ`, for which the dynamics are
-/// simulated once more.
+/// First and second derivatives are exact: `g′ φ′`, and `φ′ᵀ ∇²(πᵀg) φ′` plus the second
+/// derivatives of `φ` with the multipliers `g′ᵀπ`, where `π` are the multipliers of the last state.
+/// Second derivatives require one more simulation.
 ///
 /// # Example
-/// What turns by `u` in each of four intervals, and by a quarter altogether.
+/// An angle grows by `u` in each of four intervals, by a quarter turn in total.
 /// ```
 /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem, ReturnMap};
 /// use casados::prelude::*;
@@ -63,7 +63,7 @@ impl<G: Function, D: fmt::Debug, T: Plain> fmt::Debug for ReturnMap<G, D, T> {
 }
 
 impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
-    /// These dynamics, with the map at their end. Memory is allocated here and by the first second
+    /// Adds the map to the end of these dynamics. Memory is allocated here and by the first second
     /// derivatives.
     #[must_use]
     pub fn new(dynamics: D) -> Self {
@@ -75,12 +75,13 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
         Self { dynamics, end_map: EndMap::new() }
     }
 
-    /// The dynamics, without the map.
+    /// Returns the dynamics without the map.
     pub fn dynamics(&mut self) -> &mut D {
         &mut self.dynamics
     }
 
-    /// What a call of the dynamics returns, with the map at its end and so many of its derivatives.
+    /// Evaluates the dynamics, and applies the map to the end of the last interval, with
+    /// derivatives of the map up to the order `derivatives`.
     fn evaluate_with_map(
         &mut self,
         nodes: &Nodes<'_, T>,
@@ -94,7 +95,7 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
         let t = nodes.times.last().copied().unwrap_or(T::ZERO);
         let is_end = nodes.piece.is_none_or(|[_, end]| end == T::ONE);
         let mut outcome = Ok(());
-        // Second derivatives of the dynamics take other multipliers of the end: see there.
+        // Second derivatives of the dynamics require the multipliers `g′ᵀπ` of the last interval.
         let pulled_back_multipliers = core::mem::take(&mut end.pulled_back_multipliers);
         let inner = Nodes {
             multipliers: if derivatives == 2 { &pulled_back_multipliers } else { nodes.multipliers },
@@ -150,14 +151,14 @@ impl<G: Function<Shape = D::Shape>, D: SecondOrder<T>, T: Real> SecondOrder<T> f
         if nodes.piece.is_some_and(|[_, end]| end != T::ONE) {
             return self.dynamics.second_order(nodes, sink);
         }
-        // Where the last interval ends says what its multipliers are.
+        // The multipliers `g′ᵀπ` depend on the state at the end of the last interval.
         self.evaluate_with_map(nodes, D::simulate, 1, &mut |_, _| {})?;
         self.end_map.pull_back_multipliers(nodes);
         self.evaluate_with_map(nodes, D::second_order, 2, sink)
     }
 }
 
-/// The map at an end, and what it makes of a step.
+/// The map at the end of the last interval, and the derivatives of the mapped interval.
 struct EndMap<G: Function, T: Plain> {
     v: ArrayV<G, T>,
     end_multipliers: ArrayY<G, T>,
@@ -168,9 +169,10 @@ struct EndMap<G: Function, T: Plain> {
     /// `g′` and `∇²(πᵀg)`, column after column.
     dense_jacobian: Vec<T>,
     dense_hessian: Vec<T>,
-    /// Those of all intervals, of the last one before the map: `g′ᵀπ`.
+    /// The multipliers of all intervals, with `g′ᵀπ` for the last one.
     pulled_back_multipliers: Vec<T>,
-    /// Derivatives of `x_N` by `x`, `u`, `p`, and second ones, as a [`IntervalResult`] has them.
+    /// The derivatives of `x_N` by `x`, `u`, `p`, and the second derivatives, as in
+    /// [`IntervalResult`].
     end_jacobians: [Vec<T>; 3],
     end_hessians: [Vec<T>; 6],
 }
@@ -195,7 +197,7 @@ impl<G: Function, T: Real> EndMap<G, T> {
         }
     }
 
-    /// The map at the end of a step, with so many derivatives.
+    /// Evaluates the map at the end of an interval, with derivatives up to the order `derivatives`.
     fn evaluate(&mut self, step: &IntervalResult<'_, T>, t: T, derivatives: usize, pi: &[T]) {
         write_variables::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
         if derivatives == 0 {
@@ -220,7 +222,7 @@ impl<G: Function, T: Real> EndMap<G, T> {
         self.chain_hessians(step);
     }
 
-    /// `g′ φ′`
+    /// Computes `g′ φ′`.
     fn chain_jacobians(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
         for (slopes, of_step) in self.end_jacobians.iter_mut().zip([step.dx, step.du, step.dp]) {
@@ -233,7 +235,7 @@ impl<G: Function, T: Real> EndMap<G, T> {
         }
     }
 
-    /// Second derivatives of `φ` along `g′ᵀπ`, and `φ′ᵀ ∇²(πᵀg) φ′`.
+    /// Computes the second derivatives of `φ` with the multipliers `g′ᵀπ` plus `φ′ᵀ ∇²(πᵀg) φ′`.
     fn chain_hessians(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
         let [dx, du, dp] = [step.dx, step.du, step.dp];
@@ -253,7 +255,7 @@ impl<G: Function, T: Real> EndMap<G, T> {
         }
     }
 
-    /// The multipliers of all intervals, with `g′ᵀπ` in the place of the last.
+    /// Copies the multipliers of all intervals, with `g′ᵀπ` for the last one.
     fn pull_back_multipliers(&mut self, nodes: &Nodes<'_, T>) {
         let nx = G::Shape::NX.max(1);
         self.pulled_back_multipliers.clear();
@@ -265,7 +267,8 @@ impl<G: Function, T: Real> EndMap<G, T> {
         }
     }
 
-    /// The step with the map at its end, and with as many derivatives.
+    /// Returns the result of the interval after the map, with derivatives up to the order
+    /// `derivatives`.
     fn mapped_result<'a>(
         &'a self,
         step: &IntervalResult<'a, T>,

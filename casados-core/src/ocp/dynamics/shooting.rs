@@ -18,7 +18,8 @@ use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
+/// Integrates all intervals of a horizon in one call, in SIMD lanes and threads (feature
+/// `parallel`).
 ///
 /// ```
 /// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem, Shooting};
@@ -47,11 +48,11 @@ pub struct Shooting<I: Single> {
     t: Vec<I::Number>,
     lambda: Vec<VectorX<I::Model, I::Number>>,
     nu: Vec<VectorZ<I::Model, I::Number>>,
-    /// Results of a few intervals at a time.
+    /// Results of one chunk of intervals.
     nominal: Vec<Nominal<I::Model, I::Number>>,
     forward: Vec<Forward<I::Model, I::Number>>,
     hessian: Vec<Hessian<I::Model, I::Number>>,
-    /// Whether the batch has the stages of all intervals that are here.
+    /// Whether the stages in the batch are those of the intervals in `x`, `u`, `p`, `h`, `t`.
     stages_are_current: bool,
 }
 
@@ -69,7 +70,7 @@ impl<I: Single> Clone for Shooting<I> {
 }
 
 impl<I: Single> Shooting<I> {
-    /// Memory for the intervals is allocated by the first call of its kind.
+    /// Wraps a batch. The first call of each kind allocates the memory of the intervals.
     #[must_use]
     pub fn new(batch: Integrator<I>) -> Self {
         Self {
@@ -88,15 +89,15 @@ impl<I: Single> Shooting<I> {
         }
     }
 
-    /// The batch.
+    /// Returns the batch.
     pub fn batch(&mut self) -> &mut Integrator<I> {
-        // Whoever has it may use it for something else.
+        // The caller may integrate other intervals with it.
         self.stages_are_current = false;
         &mut self.batch
     }
 
-    /// Copies the intervals to where the batch takes them from, and their multipliers if they are
-    /// asked for. Where they are those of the last call, the batch has their stages.
+    /// Copies the intervals, and their multipliers if requested, to the arguments of the batch. If
+    /// the intervals are those of the last call, the batch reuses its stages.
     fn load_intervals(&mut self, nodes: &Nodes<'_, I::Number>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
         let mut is_unchanged = core::mem::take(&mut self.stages_are_current) && self.x.len() == n;
@@ -127,13 +128,13 @@ impl<I: Single> Shooting<I> {
                 self.nu.push(vector(interval.nu));
             }
         }
-        // Lifted stages go on where they are.
+        // Lifted stages advance in each call: they are not reused.
         self.batch.store_stages(is_unchanged && self.batch.options().newton.fixed_iterations.is_none());
         Ok(())
     }
 
-    /// The results of all intervals, of which a few at a time are in memory; with the multipliers
-    /// of ends and algebraic states, if these are asked for.
+    /// Evaluates all intervals chunk by chunk, with the multipliers of ends and algebraic states if
+    /// these are given.
     fn evaluate_intervals<R: BatchOutput<I::Model, I::Number> + Zeroable>(
         &mut self,
         nodes: &Nodes<'_, I::Number>,
@@ -155,7 +156,7 @@ impl<I: Single> Shooting<I> {
     }
 }
 
-/// Writes an element, or adds it at the end; whether it was there already.
+/// Replaces or appends an element; returns whether it was there with the same value.
 fn replace_or_push<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -> bool {
     match list.get_mut(k) {
         Some(element) => {
@@ -170,7 +171,7 @@ fn replace_or_push<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V
     }
 }
 
-/// An empty list with room for so many.
+/// Clears a list and reserves memory for `length` elements.
 fn clear_and_reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
     Ok(try_reserve(list, length)?)
@@ -182,13 +183,13 @@ impl<I: Single<Number = T> + DenseOutput<T>, T: Real> Dynamics<T> for Shooting<I
     const ALGEBRAIC: bool = true;
     const STRUCTURE: DynamicsStructure = model_structure::<I::Model>();
 
-    /// They are in any case, and found where the point is the same.
+    /// Stages are always stored; `load_intervals` decides whether they are reused.
     #[cfg(feature = "casadi")]
     fn keep_stages(&mut self, _solved: bool) -> bool {
         true
     }
 
-    /// Lifted stages are those of whole intervals.
+    /// Lifted stages belong to whole intervals.
     fn has_pieces(&self) -> bool {
         self.batch.options().newton.fixed_iterations.is_none()
     }

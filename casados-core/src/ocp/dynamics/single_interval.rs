@@ -1,5 +1,5 @@
-//! Integrators of single intervals as dynamics: one interval after the other, without other memory
-//! than theirs.
+//! Integrators of single intervals as dynamics: one interval after the other, without further
+//! memory.
 
 use crate::function::Function;
 use crate::integrator::Integrator as _;
@@ -21,7 +21,7 @@ use crate::shape::Matrix;
 use crate::{erk, irk};
 use core::fmt;
 
-/// The names that a model gives.
+/// Returns the names of a model.
 pub(in crate::ocp) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
     Names {
@@ -37,16 +37,16 @@ pub(in crate::ocp) const fn names<M: Dae>() -> Names {
     }
 }
 
-/// The equations of a model.
+/// Returns the sparsity of the equations of a model.
 pub(in crate::ocp) const fn model_structure<M: Dae>() -> DynamicsStructure {
     DynamicsStructure::Equations(M::STRUCTURE.jacobian, M::STRUCTURE.hessian)
 }
 
 /// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the
-/// integral of a square of [`LeastSquares`], which has the matrix of Gauss and Newton. Of a
-/// quadrature, which has no such matrix, the Hessian is known to exact methods only.
+/// integral of a square of [`LeastSquares`], which has a Gauss-Newton matrix. A quadrature has
+/// none: only exact Hessians contain its second derivatives.
 ///
-/// References of integrals are parameters, which every stage has for itself.
+/// References of integrals are parameters, with a value for each stage.
 ///
 /// ```
 /// use casados::ocp::{HeapSqp, Horizon, Problem, WithIntegral};
@@ -73,13 +73,13 @@ pub struct WithIntegral<I, Q> {
 }
 
 impl<I, Q> WithIntegral<I, Q> {
-    /// Both together.
+    /// An integrator with an integral cost.
     pub fn new(integrator: I, integral: Q) -> Self {
         Self { integrator, integral }
     }
 }
 
-/// What is an integral cost.
+/// An integrand that can be an integral cost.
 ///
 /// ```
 /// use casados::ocp::{HeapSqp, Horizon, IntegralCost, OcpError, Problem, WithIntegral};
@@ -102,7 +102,7 @@ impl<I, Q> WithIntegral<I, Q> {
 /// # Ok::<(), OcpError>(())
 /// ```
 pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
-    /// Whether its weights make sense.
+    /// Checks its weights.
     ///
     /// # Errors
     /// [`OcpError::InvalidWeight`]
@@ -110,16 +110,16 @@ pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
     fn check(&self) -> Result<(), OcpError> {
         Ok(())
     }
-    /// Shows it as mathematics.
+    /// Prints it as a formula.
     ///
     /// # Errors
-    /// Those of what shows it.
+    /// The errors of `show`.
     #[doc(hidden)]
     fn term(&self, show: TermWriter<'_>) -> fmt::Result;
-    /// Before every interval.
+    /// Prepares the integrand for an interval.
     #[doc(hidden)]
     fn prepare(&mut self);
-    /// The value of the last interval and its derivatives.
+    /// Returns the value of the last interval and its derivatives.
     #[doc(hidden)]
     fn terms(&self) -> IntegralTerms<'_, T>;
 }
@@ -261,7 +261,7 @@ macro_rules! single {
                     let lambda = vector(at.multipliers);
                     let along: Option<&mut dyn Integrand<M, T>> = Some(&mut *integral);
                     let result = integrator.hessian_with_quadrature(x, u, at.h, &lambda, $(at.$nu,)? along)?;
-                    // The Hessian is that of both together: what the integral would add is in it.
+                    // The Hessian of the integrator contains that of the integral.
                     let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 3], ..integral.terms() };
                     Ok(IntervalResult { cost, ..result.into() })
                 })

@@ -1,4 +1,4 @@
-//! Integrators that wrap others as dynamics: with a projection, and divided intervals.
+//! Wrapped integrators as dynamics: with projection, and with divided intervals.
 
 use crate::constrained::{Projectable, Projected};
 use crate::integrator::{Divided, Integrator};

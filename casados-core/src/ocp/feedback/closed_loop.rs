@@ -1,4 +1,4 @@
-//! Closed loops: a controller and a plant, sample after sample.
+//! Closed loops of a controller and a plant.
 
 use crate::integrator::Integrator;
 use crate::model::VectorP;
@@ -17,7 +17,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix as _, Shape};
 use alloc::vec::Vec;
 
-/// Where a closed loop is.
+/// A sample of a closed loop.
 ///
 /// ```
 /// use casados::ocp::Sample;
@@ -33,17 +33,17 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Sample<T> {
-    /// The number of the sample, from zero.
+    /// The index of the sample, from zero.
     pub index: usize,
-    /// Its time, from zero.
+    /// The time of its start; the first one is zero.
     pub time: T,
-    /// How long it is: the first interval of the controller's horizon.
+    /// Its length: the first interval of the controller's horizon.
     pub length: T,
 }
 
-/// What has a control for each state: [`HeapRealTime`], by an iteration in each sample; and a
-/// problem with a solver, `(ocp, sqp)`, by its solution. One of one's own may filter measurements,
-/// or change references and parameters before it asks another one.
+/// A controller, which computes a control for each state: [`HeapRealTime`], by one iteration in
+/// each sample; or a problem with a solver, `(ocp, sqp)`, by its solution. A user's own controller
+/// may filter measurements, or change references and parameters before it calls another one.
 ///
 /// ```
 /// use casados::ocp::{Controller, Formulation, HeapOcp, OcpError};
@@ -63,13 +63,13 @@ pub struct Sample<T> {
 /// }
 /// ```
 pub trait Controller<P, T: Real> {
-    /// Writes the control for a state, and makes ready for the next sample.
+    /// Writes the control for a state, and prepares the next sample.
     ///
     /// # Errors
-    /// Those of the solver: then the loop goes on with the control before.
+    /// The errors of the solver; the loop then holds the last control.
     fn control(&mut self, x: &[T], u: &mut [T]) -> Result<(), OcpError>;
 
-    /// The problem: the costs and constraints of its first stage are those of the sample.
+    /// The problem; the costs and constraints of its first stage are recorded.
     fn problem(&mut self) -> &mut HeapOcp<P, T>;
 }
 
@@ -102,7 +102,7 @@ impl<P: Formulation<T>, S: OcpSolver<P, T>, T: Real> Controller<P, T> for (HeapO
     }
 }
 
-/// A plant for [`closed_loop`]: an integrator, with parameters of its own.
+/// A plant for [`closed_loop`]: an integrator with its own parameters.
 ///
 /// ```
 /// # use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Problem, closed_loop, plant};
@@ -124,7 +124,7 @@ impl<P: Formulation<T>, S: OcpSolver<P, T>, T: Real> Controller<P, T> for (HeapO
 /// assert!(run.trajectory.state("x[0]")?[60].abs() < 0.02);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-// A closure has no name, and an alias cannot say what it implements.
+// A closure has no name, and an alias cannot name its trait.
 #[allow(clippy::type_complexity)]
 pub fn plant<I: Integrator>(
     integrator: &mut I,
@@ -140,21 +140,21 @@ pub fn plant<I: Integrator>(
     }
 }
 
-/// Simulates a closed loop: in each sample the controller gives a control for the state, the plant
-/// goes on with it, and the disturbance changes where it arrives.
+/// Simulates a closed loop: in each sample the controller computes a control for the state, the
+/// plant is integrated with it, and the disturbance changes the end state.
 ///
-/// `plant(sample, u, x)` writes the state at the end of the sample over that at its begin;
-/// [`plant`] makes one of an integrator. `disturbance(sample, x)` changes it then; `|_, _| {}` does
-/// not. Where the controller has no control the one before is held, zero at first, and
-/// [`ClosedLoop::failures`] says why.
+/// `plant(sample, u, x)` replaces the state at the start of the sample by that at its end;
+/// [`plant`] creates one from an integrator. `disturbance(sample, x)` then changes it; `|_, _| {}`
+/// does nothing. If the controller fails, the last control is held, zero at first;
+/// [`ClosedLoop::failures`] has the errors.
 ///
-/// Costs are those of the stage cost of the controller's problem at its first stage, at states and
-/// controls as they were; bounds and path constraints, too.
+/// Costs, bounds and path constraints are those of the first stage of the controller's problem, at
+/// the actual states and controls.
 ///
 /// # Errors
-/// [`OcpError::Length`] if the state has other dimensions; [`OcpError::Unsupported`] where costs or
-/// constraints have algebraic states; errors of the plant; [`OcpError::NonFiniteFunction`] where a
-/// cost has no value; [`OcpError::OutOfMemory`].
+/// [`OcpError::Length`] if the state has another dimension; [`OcpError::Unsupported`] if costs or
+/// constraints depend on algebraic states; errors of the plant; [`OcpError::NonFiniteFunction`] if
+/// a cost is not finite; [`OcpError::OutOfMemory`].
 ///
 /// # Example
 /// ```
@@ -208,13 +208,13 @@ pub fn closed_loop<P: Formulation<T>, T: Real>(
     recorder.finish(controller.problem(), &x)
 }
 
-/// Runs many closed loops, or whatever else `run` does: `make` makes what a run works with, once
-/// for each thread, and `run` takes it with the number of the run. With the feature `parallel` runs
-/// are shared among the threads of rayon. Results are in the order of the runs, and the same
-/// whatever the number of threads if each run begins with all that it depends on.
+/// Runs many closed loops, or other simulations. `make` creates the data of a thread, and `run`
+/// uses them with the index of the run. With the feature `parallel` the threads of rayon share the
+/// runs. Results are in the order of the runs; they are independent of the number of threads if
+/// each run initialises its data.
 ///
 /// # Errors
-/// Those of `make`, and [`OcpError::OutOfMemory`].
+/// The errors of `make`, and [`OcpError::OutOfMemory`].
 ///
 /// # Example
 /// ```

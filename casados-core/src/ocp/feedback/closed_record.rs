@@ -1,4 +1,4 @@
-//! What is recorded of a closed loop.
+//! Records of closed loops.
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
@@ -18,7 +18,7 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// A closed loop as it was; see [`closed_loop`](crate::ocp::closed_loop).
+/// The record of a closed loop; see [`closed_loop`](crate::ocp::closed_loop).
 ///
 /// ```
 /// # use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Map, Problem, closed_loop};
@@ -48,16 +48,16 @@ use bytemuck::Zeroable;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct ClosedLoop<T = f64> {
-    /// States at the begin of every sample and at the end, controls, and path constraints, by their
-    /// names, with the bounds of the controller's problem: to be drawn, written, and asked for
-    /// violations. Times begin at zero.
+    /// States at the start of every sample and at the end, controls, and path constraints, by
+    /// names, with the bounds of the controller's problem: for plots, files and violations. Times
+    /// start at zero.
     pub trajectory: Trajectory<T>,
     /// The stage cost of each sample.
     pub costs: Vec<T>,
-    /// How long the controller took in each sample, in seconds; zero where there is no clock
+    /// The computation times of the controller in seconds, for each sample; zero without a clock
     /// (without the feature `std`).
     pub durations: Vec<f64>,
-    /// Samples without a control, in which the one before was held, and why.
+    /// The samples in which the controller failed and the last control was held, with the errors.
     pub failures: Vec<(usize, OcpError)>,
 }
 
@@ -69,11 +69,11 @@ impl<T: Real> ClosedLoop<T> {
     }
 }
 
-/// A loop while it runs.
+/// The recorder of a running closed loop.
 pub struct Recorder<T> {
-    /// How long a sample is.
+    /// The length of a sample.
     pub sample_length: T,
-    /// One row after the other: states of all samples and of the end, controls, path constraints.
+    /// Rows of states of all samples and of the end, of controls, and of path constraints.
     x: Vec<T>,
     u: Vec<T>,
     g: Vec<T>,
@@ -83,7 +83,7 @@ pub struct Recorder<T> {
 }
 
 impl<T: Real> Recorder<T> {
-    /// Of so many samples from a state on.
+    /// Creates a recorder for a number of samples from a state.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::Unsupported`],
@@ -119,7 +119,7 @@ impl<T: Real> Recorder<T> {
         Ok(recorder)
     }
 
-    /// A sample: state, control, and what the controller said and took.
+    /// Records a sample: state, control, result and computation time of the controller.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -149,7 +149,7 @@ impl<T: Real> Recorder<T> {
         path.value(&point, rows, ConstraintContext::new(0, FreeParametersView::default(), &[]))
     }
 
-    /// The whole loop.
+    /// Returns the record of the closed loop.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -167,7 +167,7 @@ impl<T: Real> Recorder<T> {
         let column = |rows: &[T], width: usize, i: usize| {
             rows.chunks_exact(width.max(1)).filter_map(|row| row.get(i).copied()).collect()
         };
-        // The first state is given: its bounds are those of the next one.
+        // The first state is given; the bounds of states are those of the next stage.
         let bounds = [qp.stage(1).map(|stage| stage.x_bounds()), qp.stage(0).map(|stage| stage.u_bounds())];
         let all = [
             (Kind::State, model_names.x, model_names.units.x, &self.x),
@@ -198,7 +198,7 @@ impl<T: Real> Recorder<T> {
     }
 }
 
-/// The same with the bounds of an element, at all times.
+/// Adds the bounds of an element to a series, constant over all times.
 fn with_bounds<T: Real>(mut series: Series<T>, bounds: [&[T]; 2], element: usize) -> Series<T> {
     let [lower, upper] = bounds.map(|list| list.get(element).copied().filter(|bound| bound.is_finite()));
     if lower.is_some() || upper.is_some() {

@@ -1,5 +1,5 @@
-//! Whether real-time iterations contract: the conditions of optimality at the plan, and what steps
-//! reduce the merit function by beside what their QPs predict.
+//! Contraction test of real-time iterations: residuals of the optimality conditions at the plan,
+//! and the ratio of actual and predicted reductions of the merit function.
 
 use crate::linalg::dot;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
@@ -9,20 +9,21 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{Residuals, Solution, StageDims, add_symmetric, part, part_mut};
 use crate::scalar::Real;
 
-/// When real-time iterations count as divergent.
+/// The test for divergence of real-time iterations.
 ///
 /// ```text
 /// ρ = Σ_j w_j ared_j / Σ_j w_j pred_j        w_j = (1 − 1/samples)^(k − j)
 /// ared = φ(v̄) − φ(v)        pred = φ(v̄) − q(v)        φ = f + Σ_i |λ_i| |c_i|⁻        q: the QP
 /// ```
 ///
-/// `v̄` is the plan that was linearised, `v` the solution of its QP with the multipliers `λ`, both
-/// with the state and the parameters of this sample. `φ` is the exact merit function of `l₁` type,
-/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract
-/// have a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near
-/// a solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of
-/// active constraints, the contraction rate, is above one. A disturbance, noise and a reference
-/// that moves lengthen steps, and do not change what a step gains.
+/// `v̄` is the plan at which the problem was linearised, `v` the solution of its QP with the
+/// multipliers `λ`, both with the state and the parameters of this sample. `φ` is the exact `l₁`
+/// merit function, where `f` includes penalties of soft bounds; `q` is its value in the QP.
+///
+/// Contracting iterations have a ratio near one. Iterations that cycle around a solution reduce
+/// nothing, whatever the QPs predict. Near a solution they diverge if the contraction rate `κ`, the
+/// spectral radius of `I − H⁻¹∇²L` on the null space of active constraints, is above one.
+/// Disturbances, noise and moving references lengthen steps, but do not change the ratio.
 ///
 /// Source: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2nd edition, (4.4) and section 18.5;
 /// contraction: M. Diehl, H. G. Bock, J. P. Schlöder, SIAM J. Control Optim. 43, 2005.
@@ -35,13 +36,14 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContractionTest {
-    /// Over how many iterations the ratio is a mean, and how many it takes at least. Default 5.
+    /// The number of iterations in the mean of the ratio, and the number required for a verdict.
+    /// Default 5.
     pub samples: usize,
     /// Iterations with a smaller ratio are [`Contraction::Diverging`]. Default 0.1.
     pub min_ratio: f64,
-    /// Predicted reductions that are smaller, relative to the merit function or to one, are not
-    /// judged. Iterations in one sample end where residuals are no larger. Default 1e-6, in single
-    /// precision 1e-3.
+    /// Iterations with a smaller predicted reduction, relative to the merit function or to one, are
+    /// ignored. Repeated iterations in one sample end at residuals up to this. Default 1e-6, in
+    /// single precision 1e-3.
     pub tolerance: f64,
 }
 
@@ -58,7 +60,7 @@ impl ContractionTest {
     }
 }
 
-/// What is known of the contraction of real-time iterations; see [`ContractionTest`].
+/// The verdict on the contraction of real-time iterations; see [`ContractionTest`].
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -79,17 +81,17 @@ impl ContractionTest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Contraction {
-    /// There were too few iterations that predict more than the tolerance.
+    /// Too few iterations predicted more than the tolerance.
     Unknown,
-    /// Iterations gain what their QPs predict, or there is nothing left to be gained.
+    /// Iterations achieve the reductions that their QPs predict, or no reduction is left.
     Contracting,
-    /// Iterations do not gain what their QPs predict. Exact Hessians
-    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what
-    /// moves.
+    /// Iterations do not achieve the reductions that their QPs predict. Exact Hessians
+    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or additional costs
+    /// of the quantities that oscillate.
     Diverging,
 }
 
-/// How real-time iterations converge.
+/// The convergence of real-time iterations.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -112,27 +114,28 @@ pub enum Contraction {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Convergence {
-    /// The conditions of optimality at the plan that was linearised, with its own first state as
-    /// the initial state: what [`Sqp`](crate::ocp::Sqp) measures, too.
+    /// The residuals of the optimality conditions at the plan that was linearised, with its own
+    /// first state as the initial state, as in [`Sqp`](crate::ocp::Sqp).
     pub residuals: Residuals,
-    /// The largest change of a state or control from that plan to the next one.
+    /// The largest change of a state or control from this plan to the next one.
     pub step_size: f64,
-    /// `ρ` of [`ContractionTest`] over the iterations before this one; one while nothing is known.
+    /// `ρ` of [`ContractionTest`] over the iterations before this one; one before the first
+    /// verdict.
     pub reduction_ratio: f64,
-    /// What it says.
+    /// The verdict of the test.
     pub contraction: Contraction,
 }
 
-/// What the contraction test remembers. Its functions are pointers: a controller without a monitor
-/// has none of their code.
+/// State of the contraction test. Its functions are pointers: a controller without a monitor
+/// contains none of their code.
 pub(in crate::ocp) struct ContractionMonitor<P, T, D, M> {
-    /// Weights of the merit function, in the places of multipliers.
+    /// Weights of the merit function, in place of multipliers.
     weights: Solution<T, D, M>,
     /// Ends of intervals and constraints.
     ends: M,
-    /// Whether the last iteration is still to be judged.
+    /// Whether the last iteration has not been evaluated.
     has_pending_iteration: bool,
-    /// The sums of actual and predicted reductions, and of how many.
+    /// The sums of actual and of predicted reductions, and the number of iterations.
     reduction_sums: [f64; 2],
     iteration_count: usize,
     residuals: Residuals,
@@ -145,11 +148,11 @@ pub(in crate::ocp) struct ContractionMonitor<P, T, D, M> {
 type StepSizeFn<P, T, D, M> = fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64;
 
 /// The actual and the predicted reduction of the step from the plan to the solution of its QP, and
-/// the size of the merit function.
+/// the value of the merit function.
 type ReductionsFn<P, T, D, M> =
     fn(&mut Ocp<P, T, D, M>, &Solution<T, D, M>, &mut Solution<T, D, M>, &mut [T]) -> [f64; 3];
 
-/// How many numbers a monitor takes for a problem: weights, and ends of intervals.
+/// The lengths of the memory of a monitor: for weights, and for ends of intervals.
 pub(in crate::ocp) const fn memory_lens<T: Real>(dims: &[StageDims]) -> [usize; 2] {
     [Solution::<T, (), ()>::memory(dims), crate::ocp::formulation::program::ends(dims)]
 }
@@ -157,7 +160,7 @@ pub(in crate::ocp) const fn memory_lens<T: Real>(dims: &[StageDims]) -> [usize; 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
     ContractionMonitor<P, T, D, M>
 {
-    /// In memory of [`memory`] numbers.
+    /// Creates a monitor in memory of the lengths [`memory_lens`].
     pub fn new(weights: Solution<T, D, M>, ends: M) -> Self {
         Self {
             weights,
@@ -172,12 +175,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Measures the plan where it has been linearised.
+    /// Computes the residuals at the linearised plan.
     pub fn update_residuals(&mut self, ocp: &mut Ocp<P, T, D, M>) {
         self.residuals = (self.residuals_fn)(ocp);
     }
 
-    /// What is known where the QP of the plan, which is the iterate, has been solved.
+    /// Returns the convergence after the QP of the plan, the iterate, has been solved.
     pub fn convergence_at_solution(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -198,8 +201,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Convergence { residuals, step_size, reduction_ratio, contraction }
     }
 
-    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of
-    /// `before`.
+    /// Evaluates the last iteration, from the plan `before` to the iterate. The QP must still be
+    /// that of `before`.
     pub fn update_reductions(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -214,26 +217,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             (self.reductions_fn)(ocp, before, &mut self.weights, self.ends.as_mut());
         core::mem::swap(&mut ocp.iterate, before);
         if predicted > test.tolerance * merit.abs().max(1.0) {
-            // A step that loses much is forgotten as fast as one that loses what it was to gain;
-            // one to a point without a value is as bad.
+            // Large increases of the merit function count as the negative predicted reduction, so
+            // that they are forgotten equally fast; so do non-finite values.
             let actual = if actual > -predicted { actual } else { -predicted };
             let decay = 1.0 - 1.0 / test.samples.max(1) as f64;
             self.reduction_sums =
                 [decay * self.reduction_sums[0] + actual, decay * self.reduction_sums[1] + predicted];
             self.iteration_count = self.iteration_count.saturating_add(1);
         } else if self.reduction_sums[1] <= predicted.abs() {
-            // Nothing is left to be gained.
+            // No reduction is left.
             self.reduction_sums = [0.0; 2];
         }
     }
 
-    /// Forgets all iterations.
+    /// Resets the test.
     pub fn reset(&mut self) {
         (self.has_pending_iteration, self.reduction_sums, self.iteration_count) = (false, [0.0; 2], 0);
     }
 }
 
-/// The conditions of optimality at the plan, whose first state is the initial state.
+/// The residuals at the plan, with its first state as the initial state.
 fn plan_residuals<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
 ) -> Residuals {

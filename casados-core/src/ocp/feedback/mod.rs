@@ -1,5 +1,4 @@
-//! Feedback in real time: the controller, its two phases, whether its iterations contract, and
-//! closed loops.
+//! Real-time feedback: the controller, its two phases, the contraction test, and closed loops.
 
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod closed_loop;

@@ -1,4 +1,4 @@
-//! The two phases of a real-time iteration, and what the second one gives.
+//! The preparation and the feedback phase of a real-time iteration.
 
 use super::contraction::{Contraction, Convergence};
 use super::real_time::{IterationResult, RealTime};
@@ -8,7 +8,7 @@ use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{QpSolver, QpStatistics, StageDims};
 use crate::scalar::Real;
 
-/// A QP that waits for the state; see [`RealTime`].
+/// A prepared QP, which lacks only the state; see [`RealTime`].
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -33,7 +33,7 @@ pub struct Prepared<'a, P, S, C, T, D, M> {
     pub(super) controller: &'a mut RealTime<P, S, C, T, D, M>,
 }
 
-/// The control that is applied where there is no feedback; see [`Prepared::feedback_or`].
+/// The control to apply if the feedback fails; see [`Prepared::feedback_or`].
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -56,13 +56,14 @@ pub struct Prepared<'a, P, S, C, T, D, M> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fallback<'u, T> {
-    /// The first control of the plan: that of the sample before, shifted.
+    /// The first control of the plan: the shifted plan of the last sample.
     Plan,
-    /// This one: that of another controller, of the stop, or the one before, which is held.
+    /// This control: that of another controller or of an emergency stop, or the last one, which is
+    /// held.
     Control(&'u [T]),
 }
 
-/// What is to be done now.
+/// The result of the feedback phase.
 ///
 /// ```
 /// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -84,23 +85,23 @@ pub enum Fallback<'u, T> {
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Feedback<'a, T> {
-    /// The control to be applied: the first of the plan.
+    /// The control to apply: the first one of the plan.
     pub u: &'a [T],
-    /// What the QP took, the last one where there were several.
+    /// Statistics of the QP, or of the last one if there were several.
     pub statistics: QpStatistics,
     /// Iterations of sequential quadratic programming in this sample.
     pub iterations: usize,
-    /// What was added to the diagonal of the Hessian so that the QP is convex; see
+    /// The inertia correction of the Hessian; see
     /// [`Convexification::Reduced`](crate::ocp::Convexification::Reduced).
     pub regularisation: f64,
-    /// Residuals, the step and whether iterations contract; none of a controller without a monitor
+    /// Residuals, the step size and the contraction; `None` for a controller without a monitor
     /// ([`HeapRealTime::monitored`](crate::ocp::HeapRealTime::monitored)).
     pub convergence: Option<Convergence>,
 }
 
 impl<T> Feedback<'_, T> {
-    /// Whether iterations diverge: the control is that of a plan which does not come nearer to a
-    /// solution; see [`ContractionTest`](crate::ocp::ContractionTest).
+    /// Whether iterations diverge: the plan does not approach a solution; see
+    /// [`ContractionTest`](crate::ocp::ContractionTest).
     #[must_use]
     pub fn is_diverging(&self) -> bool {
         self.convergence.is_some_and(|convergence| convergence.contraction == Contraction::Diverging)
@@ -112,8 +113,7 @@ impl<P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: As
 where
     C: Curvature<P::Dynamics, T>,
 {
-    /// The preparation phase: linearises at the plan, everything that can be done before the state
-    /// is known.
+    /// The preparation phase: linearises at the plan, before the state is known.
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -128,7 +128,7 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M
 where
     C: Curvature<P::Dynamics, T>,
 {
-    /// The feedback phase: solves the QP with this state at its start.
+    /// The feedback phase: solves the QP with this initial state.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::NonFiniteDerivative`],
@@ -137,12 +137,12 @@ where
         self.feedback_until(x0, &mut || false)
     }
 
-    /// As [`Prepared::feedback`], until the time is over; see [`QpSolver::solve_until`].
+    /// [`Prepared::feedback`] with a deadline; see [`QpSolver::solve_until`].
     ///
     /// # Errors
-    /// As [`Prepared::feedback`], and [`OcpError::Qp`] with
-    /// [`QpError::OutOfTime`](crate::qp::QpError::OutOfTime): then the first control of the plan,
-    /// which is as it was, is what is left to apply.
+    /// The errors of [`Prepared::feedback`], and [`OcpError::Qp`] with
+    /// [`QpError::OutOfTime`](crate::qp::QpError::OutOfTime): the plan is unchanged then, and its
+    /// first control may be applied.
     ///
     /// # Example
     /// ```
@@ -172,8 +172,8 @@ where
         self.feedback_from(step, 1)
     }
 
-    /// As [`Prepared::feedback_until`], with a control in any case: that of the feedback, or where
-    /// there is an error the fallback.
+    /// [`Prepared::feedback_until`], which always returns a control: that of the feedback, or the
+    /// fallback after an error.
     pub fn feedback_or(
         self,
         x0: &[T],
@@ -190,13 +190,14 @@ where
         }
     }
 
-    /// As [`Prepared::feedback_until`], with more iterations of sequential quadratic programming
-    /// for the same state: until residuals are within the tolerance of the
-    /// [`ContractionTest`](crate::ocp::ContractionTest), there were `max_iterations`, or the time
-    /// is over. The plan is that of the last iteration that was complete.
+    /// [`Prepared::feedback_until`] with several iterations of sequential quadratic programming for
+    /// the same state: until residuals are within the tolerance of the
+    /// [`ContractionTest`](crate::ocp::ContractionTest), the number of iterations is
+    /// `max_iterations`, or the deadline has passed. The plan is that of the last complete
+    /// iteration.
     ///
     /// # Errors
-    /// As [`Prepared::feedback_until`], of the first iteration.
+    /// The errors of [`Prepared::feedback_until`] in the first iteration.
     ///
     /// # Example
     /// ```

@@ -1,7 +1,7 @@
-//! The real-time iteration: of sequential quadratic programming one full step in each sample, cut
-//! in two where the state becomes known (M. Diehl, H. G. Bock, J. P. Schlöder, "A real-time
-//! iteration scheme for nonlinear optimization in optimal feedback control", SIAM J. Control Optim.
-//! 43, 2005).
+//! The real-time iteration: one full step of sequential quadratic programming in each sample,
+//! divided into a preparation phase before the state is known and a feedback phase (M. Diehl, H. G.
+//! Bock, J. P. Schlöder, "A real-time iteration scheme for nonlinear optimization in optimal
+//! feedback control", SIAM J. Control Optim. 43, 2005).
 //!
 //! ```text
 //! prepare      linearise at the plan (x̄, ū): all integrations and derivatives; nothing of it depends on the state
@@ -31,8 +31,8 @@ use alloc::vec::Vec;
 
 /// A controller that takes one step of sequential quadratic programming in each sample.
 ///
-/// Its order is that of its types: [`RealTime::prepare`] gives what alone has `feedback`, which
-/// takes it away.
+/// Types enforce the order of the phases: only the result of [`RealTime::prepare`] has the method
+/// `feedback`, which consumes it.
 ///
 /// ```
 /// # use casados_core::ocp::{Curvature, Formulation, OcpError, RealTime};
@@ -49,7 +49,7 @@ use alloc::vec::Vec;
 /// # }
 /// ```
 ///
-/// Feedback without a preparation of its own does not compile:
+/// Feedback without its own preparation does not compile:
 ///
 /// ```compile_fail,E0382
 /// # use casados_core::ocp::{Curvature, Formulation, OcpError, RealTime};
@@ -75,35 +75,34 @@ use alloc::vec::Vec;
 /// # }
 /// ```
 ///
-/// Between two samples the plan may be followed with the gains of its QP, `gains` (feature `alloc`)
-/// of [`RealTime::ocp`]: `u_k + K_k (x − x_k)`.
+/// Between two samples the plan may be tracked with the gains of its QP, `u_k + K_k (x − x_k)`:
+/// `gains` (feature `alloc`) of [`RealTime::ocp`].
 ///
-/// Shared controls are found anew in each sample, and periodic states end where the state of the
-/// sample is.
+/// Shared controls are optimised in each sample. Periodic states end at the state of the sample.
 ///
-/// The Hessian is that of Gauss and Newton ([`HeapRealTime::new`]), or the exact one
-/// ([`HeapRealTime::exact`], [`RealTime::with_curvature`]). A QP with an exact Hessian that is not
-/// convex is regularised as by [`Sqp`](crate::ocp::Sqp), by as many QPs as that takes; with another
+/// The Hessian is the Gauss-Newton Hessian ([`HeapRealTime::new`]) or the exact one
+/// ([`HeapRealTime::exact`], [`RealTime::with_curvature`]). Nonconvex QPs with exact Hessians have
+/// an inertia correction as in [`Sqp`](crate::ocp::Sqp), which may take several QPs; with another
 /// [`Convexification`] than [`Convexification::Reduced`] each feedback solves one QP.
 ///
-/// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and
-/// `locate` switched off. After any error the plan is as it was before the call.
+/// To bound the computation time of a sample, set the options of the QP solver: limit
+/// `max_iterations`, and switch `locate` off. After an error the plan is unchanged.
 pub struct RealTime<P, S, C, T, D, M> {
     /// The Hessian.
     pub curvature: C,
-    /// The solver of QPs.
+    /// The QP solver.
     pub qp_solver: S,
-    /// When iterations count as divergent.
+    /// The test for divergence.
     pub contraction_test: ContractionTest,
     inertia: InertiaCorrection,
     monitor: Option<ContractionMonitor<P, T, D, M>>,
     pub(super) ocp: Ocp<P, T, D, M>,
     solution: Solution<T, D, M>,
-    /// Whether the plan has the multipliers of a QP before.
+    /// Whether the plan has the multipliers of an earlier QP.
     has_multipliers: bool,
 }
 
-/// A controller with its memory on the heap.
+/// A controller with memory on the heap.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -131,8 +130,8 @@ pub type HeapRealTime<P, S = HeapInteriorPoint, C = GaussNewton, T = f64> =
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewton, T> {
-    /// A controller for a problem whose iterate is the first plan, with the library's own solver of
-    /// QPs and the Hessian of Gauss and Newton.
+    /// Creates a controller for a problem whose iterate is the first plan, with the library's QP
+    /// solver and the Gauss-Newton Hessian.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -143,8 +142,8 @@ impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewt
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, Exact, T> {
-    /// As [`HeapRealTime::new`], with exact Hessians: for plans whose residuals are large, where
-    /// iterations of Gauss and Newton may diverge.
+    /// [`HeapRealTime::new`] with exact Hessians, for plans with large residuals, where
+    /// Gauss-Newton iterations may diverge.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -188,10 +187,10 @@ impl<P: Formulation<T>, C, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, C, T> 
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
-    /// The same with a monitor of its convergence:
-    /// [`Feedback::convergence`](crate::ocp::Feedback::convergence) has residuals, the size of the
-    /// step and whether iterations contract. It takes a simulation of the horizon in each sample,
-    /// between two feedbacks.
+    /// Adds a monitor of the convergence:
+    /// [`Feedback::convergence`](crate::ocp::Feedback::convergence) then has residuals, the step
+    /// size and the contraction. It costs one simulation of the horizon in each sample, between two
+    /// feedbacks.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -206,14 +205,14 @@ impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
 impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real>
     RealTime<P, S, GaussNewton, T, &'a [StageDims], &'a mut [T]>
 {
-    /// How many numbers a controller takes beside its problem and its solver of QPs.
+    /// The length of the memory of a controller, without its problem and its QP solver.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
         Solution::<T, (), ()>::memory(dims)
     }
 
-    /// A controller for a problem of these dimensions whose iterate is the first plan, in given
-    /// memory of [`RealTime::memory`] numbers.
+    /// Creates a controller for a problem of these dimensions whose iterate is the first plan, in
+    /// given memory of [`RealTime::memory`] numbers.
     ///
     /// # Errors
     /// [`OcpError::Qp`] if memory or dimensions do not fit.
@@ -229,15 +228,15 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real>
 }
 
 impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims], &'a mut [T]> {
-    /// How many numbers [`RealTime::monitored_in`] takes.
+    /// The length of the memory for [`RealTime::monitored_in`].
     #[must_use]
     pub const fn memory_of_monitor(dims: &[StageDims]) -> usize {
         let [weights_len, ends_len] = contraction::memory_lens::<T>(dims);
         weights_len.saturating_add(ends_len)
     }
 
-    /// As [`HeapRealTime::monitored`], in given memory of [`RealTime::memory_of_monitor`] numbers
-    /// for the dimensions of the problem.
+    /// [`HeapRealTime::monitored`] in given memory of [`RealTime::memory_of_monitor`] numbers for
+    /// the dimensions of the problem.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::Qp`] if memory or dimensions do not fit.
@@ -270,7 +269,7 @@ impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
         }
     }
 
-    /// The same with another Hessian.
+    /// Replaces the Hessian.
     #[must_use]
     pub fn with_curvature<N>(self, curvature: N) -> RealTime<P, S, N, T, D, M> {
         RealTime {
@@ -303,7 +302,7 @@ where
         Ok(())
     }
 
-    /// Solves the QP with this state at its start: its solution is the plan.
+    /// Solves the QP with this initial state, and makes its solution the plan.
     pub(in crate::ocp) fn iterate(
         &mut self,
         x0: &[T],
@@ -326,7 +325,7 @@ where
             qp_solver.solve_until(ocp.qp(), start, solution.view_mut(), deadline_passed)
         };
         let mut regularisation = 0.0;
-        // Other Hessians are convex, but for those of general costs that are to stay as they are.
+        // Other Hessians are convex, or are used as they are.
         let result = if C::EXACT && curvature.convexification() == Convexification::Reduced {
             let mut statistics = Err(QpError::Stalled { iterations: 0, residuals: Residuals::default() });
             let solve = |ocp: &Ocp<P, T, D, M>| {
@@ -346,13 +345,13 @@ where
         Ok(IterationResult { statistics, regularisation, convergence })
     }
 
-    /// The plan one interval earlier, for the next sample.
+    /// Shifts the plan by one interval, for the next sample.
     pub fn shift(&mut self) {
         self.update_contraction();
         self.ocp.shift();
     }
 
-    /// Judges the last iteration, before anything of its problem is changed.
+    /// Evaluates the last iteration, before its problem is changed.
     fn update_contraction(&mut self) {
         let Self { contraction_test, monitor, ocp, solution, .. } = self;
         if let Some(monitor) = monitor {
@@ -366,14 +365,13 @@ where
         &self.ocp
     }
 
-    /// The problem, with the plan as its iterate, to be changed: references, bounds, the plan
-    /// itself.
+    /// The problem, with the plan as its iterate, for changes of references, bounds or the plan.
     pub fn ocp_mut(&mut self) -> &mut Ocp<P, T, D, M> {
         self.update_contraction();
         &mut self.ocp
     }
 
-    /// The next QP starts cold, and nothing is known of the convergence.
+    /// Resets the controller: the next QP starts cold, and the contraction is unknown.
     pub fn reset(&mut self) {
         self.has_multipliers = false;
         if let Some(monitor) = &mut self.monitor {
@@ -382,7 +380,7 @@ where
     }
 }
 
-/// What an iteration took.
+/// The result of an iteration.
 pub(in crate::ocp) struct IterationResult {
     pub statistics: QpStatistics,
     pub regularisation: f64,

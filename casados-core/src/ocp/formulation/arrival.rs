@@ -1,5 +1,4 @@
-//! The arrival cost of moving-horizon estimation: what is known of the first state from before the
-//! horizon.
+//! The arrival cost of moving-horizon estimation: prior information about the first state.
 //!
 //! ```text
 //! ½ (x₀ − x̄)ᵀ W (x₀ − x̄)
@@ -18,9 +17,9 @@ use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Adds `½ (x₀ − x̄)ᵀ W (x₀ − x̄)` to the objective, in place of what was given before: the
-    /// arrival cost of moving-horizon estimation, with `W` the inverse of the covariance of `x̄`.
-    /// `weight` has the columns of `W`, which is symmetric; all zero if there is no such cost.
+    /// Sets the arrival cost of moving-horizon estimation: adds `½ (x₀ − x̄)ᵀ W (x₀ − x̄)` to the
+    /// objective and replaces an earlier arrival cost. `W` is the inverse of the covariance of
+    /// `x̄`; `weight` has the columns of `W`, which is symmetric. `W = 0` removes the cost.
     ///
     /// C. V. Rao, J. B. Rawlings, D. Q. Mayne, IEEE Trans. Autom. Control 48 (2003).
     ///
@@ -29,7 +28,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::InvalidArrivalWeight`].
     ///
     /// # Example
-    /// A mean of 0 with the weight 1, and 3 measured with the weight 2: `x + 2 (x − 3) = 0`.
+    /// The prior mean is 0 with the weight 1, the measurement 3 with the weight 2:
+    /// `x + 2 (x − 3) = 0`.
     /// ```
     /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -73,14 +73,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Whether the first state has a cost of its own, by which all of its elements may be coupled.
+    /// Returns whether there is an arrival cost, which may couple all elements of the first state.
     pub(crate) fn has_arrival_cost(&self) -> bool {
         let weights = arrival_weights::<P, T>(self.data.as_ref(), self.layout());
         weights.iter().any(|&weight| weight != T::ZERO)
     }
 }
 
-/// The cost at a point.
+/// Returns the arrival cost at a point.
 pub(in crate::ocp) fn arrival_cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
     at: &Solution<T, D, M>,
@@ -95,8 +95,8 @@ pub(in crate::ocp) fn arrival_cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>
     T::from_f64(0.5) * quadratic_form
 }
 
-/// Adds it to a QP, whose variables are not changes: `W` and `−W x̄`; or with the gradient at a
-/// state, `W (x − x̄)`.
+/// Adds the arrival cost to a QP in absolute variables: `W` to the Hessian, and to the gradient
+/// `W (x − x̄)` at the given state, or `−W x̄` without one.
 pub(in crate::ocp) fn add_to_qp<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
     state: &[T],

@@ -1,4 +1,4 @@
-//! Bounds by name, parameters and references.
+//! Bounds of constraints, initial state, parameters and references.
 
 use crate::ocp::formulation::check::{Labels, stage_range};
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
@@ -17,7 +17,7 @@ use crate::structure::name_matches;
 use core::ops::{Range, RangeBounds};
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Bounds of a general constraint of a stage, as they were given.
+    /// Returns the bounds of a general constraint of a stage as the user gave them.
     #[cfg(feature = "casadi")]
     pub(crate) fn given_bounds(&self, stage: usize, row: usize) -> [T; 2] {
         let (intervals, layout) = (self.intervals(), self.layout());
@@ -28,14 +28,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 
-    /// The names of states and controls.
+    /// Returns the names of the model and its variables.
     #[must_use]
     pub fn names(&self) -> Names {
         <P::Dynamics as Dynamics<T>>::NAMES
     }
 
-    /// Where a name means states, controls and free parameters: a part is left out of which it
-    /// means nothing.
+    /// Returns the stages at which a name denotes states, controls and free parameters. The range
+    /// is empty for a kind of variable without this name.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
@@ -52,7 +52,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             };
         let of_states = matching_stages(Part::StateBounds, model_names.x, self.intervals() + 1)?;
         let of_controls = matching_stages(Part::ControlBounds, model_names.u, self.intervals())?;
-        // They are the same at all stages.
+        // Free parameters are the same at all stages.
         let is_free = model_names
             .p
             .iter()
@@ -71,7 +71,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         name_matches(name, parameter_name) && self.free.view().index_of(parameter).is_some()
     }
 
-    /// Does something to the bounds of every variable that a name means.
+    /// Applies a function to the bounds of every variable with this name.
     pub(in crate::ocp) fn for_each_bound(
         &mut self,
         name: &str,
@@ -79,7 +79,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         mut visit: impl FnMut(&mut BoundsMut<'_, T>, usize),
     ) {
         let model_names = self.names();
-        // Of a state that is given there is nothing to be bounded.
+        // A fixed state has no bounds to set.
         let fixed_states = match self.initial_state {
             InitialState::Fixed => model_names.x.len(),
             InitialState::PartlyFixed => model_names.model_state_count(),
@@ -107,7 +107,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// What the first variable that a name means is called, from some stage on.
+    /// Returns the labels and the index of the first variable with this name, for errors at this
+    /// stage.
     pub(in crate::ocp) fn labels_of_name(&self, name: &str, stage: usize) -> (Labels, usize) {
         let model_names = self.names();
         let position = |names: &[&str]| names.iter().position(|variable| name_matches(name, variable));
@@ -119,7 +120,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Bounds of the path constraints at some stages.
+    /// Sets the bounds of the path constraints at these stages.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
@@ -134,7 +135,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.write_bounds(Part::PathBounds, range, P::Path::ROWS, lower, upper)
     }
 
-    /// Bounds of the terminal constraints.
+    /// Sets the bounds of the terminal constraints.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
@@ -161,7 +162,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let data = split_data::<P, T>(self.data.as_mut(), layout);
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
-                // The rows of the last stage lie behind those of all others.
+                // The rows of the last stage follow those of all other stages.
                 let begin = k * path_row_count::<P, T>(layout);
                 crate::qp::copy_common(crate::qp::part_mut(bounds, begin, rows), given);
                 for point in if part == Part::PathBounds { 1..points + 1 } else { 0..0 } {
@@ -173,8 +174,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The state at the start: without controls that are linear, which are free there, and without
-    /// integrals, which begin at zero.
+    /// Fixes the initial state. `x0` excludes linear controls, which are free at the start, and
+    /// integrals, which start at zero.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -196,8 +197,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The state at the start is free; it may be bounded like any other. If it was fixed, it has no
-    /// bounds until it is given new ones.
+    /// Frees the initial state; it may be bounded like any other state. A state that was fixed has
+    /// no bounds until new ones are set.
     pub fn free_initial_state(&mut self) -> &mut Self {
         let was_fixed = matches!(self.initial_state, InitialState::Fixed | InitialState::PartlyFixed);
         let model_states = self.names().model_state_count();
@@ -210,13 +211,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self
     }
 
-    /// The times of the nodes; where the end of the horizon is free, as parts of the whole.
+    /// Returns the times of the nodes; with a free end time, as fractions of the horizon.
     #[must_use]
     pub fn times(&self) -> &[T] {
         crate::qp::part(self.data.as_ref(), 0, self.intervals() + 1)
     }
 
-    /// Parameters of some nodes; the last node has parameters for terminal cost and constraints.
+    /// Sets the parameters at these nodes. The parameters of the last node are those of the
+    /// terminal cost and constraints.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
@@ -237,7 +239,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The reference of the stage cost at some stages; zero if never set.
+    /// Sets the reference of the stage cost at these stages; zero by default.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
@@ -258,8 +260,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The reference of the stage cost at every stage, as a function of the stage and of the time
-    /// of its node, which writes it over zeros.
+    /// Sets the reference of the stage cost at every stage. The function gets the stage, the time
+    /// of its node and the reference to write, which is zero before.
     ///
     /// ```
     /// # use casados::ocp::*;
@@ -281,7 +283,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     ///
     /// # Errors
-    /// [`OcpError::InvalidValue`]; then the references of the stages before are set.
+    /// [`OcpError::InvalidValue`]; the references of the stages before the error are set.
     pub fn set_references(
         &mut self,
         mut write: impl FnMut(usize, T, &mut [T]),
@@ -298,7 +300,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The reference of the terminal cost; zero if never set.
+    /// Sets the reference of the terminal cost; zero by default.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -312,7 +314,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// A constraint of the QP by its name in the problem.
+    /// Returns the name of a constraint of the QP.
     pub(in crate::ocp) fn constraint_name(
         &self,
         field: QpField,
@@ -343,10 +345,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ConstraintName { part, stage, name, output, point, side, phase: None }
     }
 
-    /// The derivative that makes a QP one without values.
+    /// Returns the first non-finite derivative in the QP.
     pub(in crate::ocp) fn find_non_finite_derivative(&self, error: &QpError) -> Option<OcpError> {
-        // Whatever a solver says of a QP without values. Derivatives come first in it, before the
-        // bounds and constants that are made with them.
+        // Every error but infeasibility may be due to non-finite data. `check` visits derivatives
+        // before the bounds and constants that depend on them.
         if matches!(error, QpError::Infeasible { .. }) {
             return None;
         }
@@ -381,6 +383,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             QpField::R | QpField::S => (input(row), 0),
             _ => ("", 0),
         };
-        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value })
+        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value, phase: None })
     }
 }

@@ -1,15 +1,15 @@
-//! Checks of what a problem is given. What they refuse they name as the model does.
+//! Checks of the input of a problem. Errors use the names of the model.
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::scalar::Real;
 use core::ops::{Bound, Range, RangeBounds};
 
-/// What the numbers of a part are called at a stage.
+/// Labels of the elements of a part of a problem at a stage, for errors.
 #[derive(Clone, Copy)]
 pub(in crate::ocp) struct Labels {
     pub part: Part,
     pub stage: usize,
-    /// The name of a variable with its index, or that of a function with one of its outputs.
+    /// Returns the name of a variable with its index, or of a function with its output.
     pub name: fn(usize) -> (&'static str, usize),
 }
 
@@ -20,7 +20,7 @@ impl Labels {
         OcpError::InvalidValue { part, stage, name, index, value }
     }
 
-    /// Whether there are numbers between two bounds.
+    /// Checks that the interval between two bounds is not empty.
     ///
     /// # Errors
     /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
@@ -41,7 +41,7 @@ impl Labels {
         Err(OcpError::CrossedBounds { part, stage, name, index, lower, upper })
     }
 
-    /// A linear penalty may be infinite: then the bound is hard.
+    /// Checks a penalty. An infinite linear penalty is allowed: the bound is hard.
     ///
     /// # Errors
     /// [`OcpError::InvalidValue`]
@@ -82,7 +82,7 @@ impl Labels {
     }
 }
 
-/// The first stage of a range.
+/// Returns the first stage of a range.
 pub(in crate::ocp) fn first_stage(stages: &impl RangeBounds<usize>) -> usize {
     match stages.start_bound() {
         Bound::Included(&start) => start,
@@ -91,7 +91,7 @@ pub(in crate::ocp) fn first_stage(stages: &impl RangeBounds<usize>) -> usize {
     }
 }
 
-/// A range of stages, at least one, of which there are so many.
+/// Returns a nonempty range of stages, of which there are `count`.
 ///
 /// # Errors
 /// [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]

@@ -1,5 +1,4 @@
-//! Variables of several stages that are one: periodic orbits, parameters that are found, free end
-//! times.
+//! Couplings of variables of several stages: periodic states, shared controls.
 //!
 //! ```text
 //! x₀[i] = x_N[i]        u_k[j] = u₀[j]
@@ -14,15 +13,15 @@ use crate::scalar::Real;
 use crate::structure::name_matches;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,
-    /// …). The initial state is to be free. None is periodic by default. Up to a given map,
-    /// `x₀ = g(x_N)`, they are with dynamics that end with it: `ReturnMap`.
+    /// Makes a state periodic, `x₀ = x_N`, or all states with this name (`x` denotes `x[0]`,
+    /// `x[1]`, …). The initial state must be free. No state is periodic by default. For periodicity
+    /// up to a map, `x₀ = g(x_N)`, use the dynamics `ReturnMap`.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]
     ///
     /// # Example
-    /// The state that a constant control holds: `x = ½ x + 1`.
+    /// The steady state of a constant control: `x = ½ x + 1`.
     /// ```
     /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -49,22 +48,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }
 
-    /// Makes controls the same at all stages, `u_k = u₀`: one, or all that a name means. Parameters
-    /// of the model are found by `HeapOcp::free`, end times with
+    /// Makes a control the same at all stages, `u_k = u₀`, or all controls with this name. For free
+    /// parameters of the model use `HeapOcp::free`, for free end times
     /// [`Horizon::free`](crate::ocp::Horizon::free).
     ///
-    /// Their guess is that of stage 0. A bound at one stage is a bound of all: one at stage 0 is
-    /// enough. What is a rate adds up to the value itself over a horizon of length one:
-    /// `running_cost` of `T` is the duration.
+    /// The guess of stage 0 is used. A bound at one stage holds at all stages. Over a horizon of
+    /// length one the integral of a shared control is its value: the `running_cost` of `T` is the
+    /// duration.
     ///
-    /// A shared control is no state with `Ṫ = 0`, which every stage would carry along, but one
-    /// right-hand side more of the recursion.
+    /// A shared control is one more right-hand side of the Riccati recursion. This is cheaper than
+    /// a state with `Ṫ = 0` at every stage.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]
     ///
     /// # Example
-    /// A line through data: where it begins is the first state, its slope a shared control.
+    /// A line through data: the offset is the first state, the slope a shared control.
     /// ```
     /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -95,7 +94,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }
 
-    /// Refuses periodic states and shared controls where nobody can solve that.
+    /// Rejects periodic states and shared controls for algorithms that do not support them.
     ///
     /// # Errors
     /// [`OcpError::Coupled`]

@@ -1,12 +1,12 @@
-//! Parameters of the model that are found with the states and controls.
+//! Free parameters: parameters of the model that are optimised with states and controls.
 //!
 //! ```text
 //! variables of a stage   (x, w, u)        of the last one   (x, w)        w the same at all stages
 //! ```
 //!
-//! `w` are shared controls of the QP, in front of the controls of the model: the recursion carries
-//! each as one right-hand side. The parameters of the model are those that were set, with `w` in
-//! the places of the free ones.
+//! The free parameters `w` are shared controls of the QP, in front of the controls of the model;
+//! each is one right-hand side of the Riccati recursion. The model's parameters are the set values,
+//! with `w` in the places of the free ones.
 
 #[cfg(feature = "alloc")]
 use crate::qp::element::set;
@@ -15,38 +15,39 @@ use crate::shape::Shape;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// No free parameter.
+/// Marks a parameter that is not free.
 const NOT_FREE: u32 = u32::MAX;
 
 /// The free parameters of a problem.
 #[derive(Clone, Debug, Default)]
 pub(in crate::ocp) struct FreeParameters {
-    /// How many copies of elements of the first state are in front of them.
+    /// The number of copies of elements of the first state, which are in front of the free
+    /// parameters.
     #[cfg(feature = "alloc")]
     initial_state_copies: usize,
-    /// Which parameter of the model each is.
+    /// The index in the model of each free parameter.
     #[cfg(feature = "alloc")]
     model_parameters: Vec<usize>,
-    /// For every parameter of the model which one of these it is, or [`NONE`].
+    /// The index among the free parameters of each parameter of the model, or [`NOT_FREE`].
     #[cfg(feature = "alloc")]
     free_indices: Vec<u32>,
-    /// Which one is the end of the horizon.
+    /// The index of the end time among the free parameters.
     #[cfg(feature = "alloc")]
     end_time: Option<usize>,
 }
 
 impl FreeParameters {
-    /// None, behind so many copies of elements of the first state.
-    pub fn with_initial_state_copies(starts: usize) -> Self {
-        let _ = starts;
+    /// No free parameters, behind this number of copies of elements of the first state.
+    pub fn with_initial_state_copies(initial_state_copies: usize) -> Self {
+        let _ = initial_state_copies;
         Self {
             #[cfg(feature = "alloc")]
-            initial_state_copies: starts,
+            initial_state_copies,
             ..Self::default()
         }
     }
 
-    /// For the functions of a problem.
+    /// Returns a view for the functions of the problem.
     #[inline(always)]
     pub fn view(&self) -> FreeParametersView<'_> {
         #[cfg(feature = "alloc")]
@@ -59,13 +60,13 @@ impl FreeParameters {
         FreeParametersView { count: 0, free_indices: &[], end_time: None }
     }
 
-    /// How many variables there are for these and for copies of elements of the first state.
+    /// Returns the number of copies of the first state and free parameters.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.view().count
     }
 
-    /// Which parameter of the model one of them is.
+    /// Returns the parameter of the model that a shared variable is.
     pub fn model_parameter(&self, index: usize) -> Option<usize> {
         #[cfg(feature = "alloc")]
         return self.model_parameters.get(index.checked_sub(self.initial_state_copies)?).copied();
@@ -76,13 +77,13 @@ impl FreeParameters {
         }
     }
 
-    /// The end of the horizon is a parameter that is free.
+    /// Declares a free parameter to be the end time of the horizon.
     #[cfg(feature = "alloc")]
     pub fn set_end_time(&mut self, parameter: usize) {
         self.end_time = self.view().index_of(parameter);
     }
 
-    /// Adds one of `np` parameters of the model: which one of these it is.
+    /// Adds one of `np` parameters of the model; returns its index among the shared variables.
     #[cfg(feature = "alloc")]
     pub fn add(&mut self, parameter: usize, np: usize) -> usize {
         self.free_indices.resize(np, NOT_FREE);
@@ -96,7 +97,7 @@ impl FreeParameters {
     }
 }
 
-/// Where free parameters are among the variables `(x, w, u)` of a stage.
+/// The positions of free parameters among the variables `(x, w, u)` of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FreeParametersView<'a> {
     count: usize,
@@ -105,31 +106,32 @@ pub struct FreeParametersView<'a> {
 }
 
 impl FreeParametersView<'_> {
-    /// Which one is the end of the horizon.
+    /// Returns the index of the end time among the shared variables.
     #[inline(always)]
     pub(in crate::ocp) fn end_time_index(self) -> Option<usize> {
         self.end_time
     }
 
-    /// How long the horizon is in units of its nodes' times: the end time, or one.
+    /// Returns the factor of the times of the nodes: the end time if it is free, otherwise one.
     #[inline(always)]
     pub(in crate::ocp) fn duration<T: Real>(self, w: &[T]) -> T {
         self.end_time.and_then(|end| w.get(end).copied()).unwrap_or(T::ONE)
     }
 
-    /// How many there are.
+    /// Returns the number of shared variables.
     #[inline(always)]
     pub(in crate::ocp) fn count(self) -> usize {
         self.count
     }
 
-    /// Which one a parameter of the model is.
+    /// Returns the index of a parameter of the model among the shared variables.
     #[inline(always)]
     pub(in crate::ocp) fn index_of(self, parameter: usize) -> Option<usize> {
         self.free_indices.get(parameter).filter(|&&place| place != NOT_FREE).map(|&place| place as usize)
     }
 
-    /// The index in `(x, w, u, z)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
+    /// Maps the index of a variable in `(ẋ, x, z, u, p, t)` to its index in `(x, w, u, z)`, if it
+    /// has one.
     #[inline(always)]
     pub(in crate::ocp) fn position<S: Shape>(self, variable: usize) -> Option<usize> {
         let (nx, nz, nu) = (S::NX, S::NZ, S::NU);
@@ -145,13 +147,14 @@ impl FreeParametersView<'_> {
         }
     }
 
-    /// Which parameter of the model one is; none of copies of elements of the first state.
+    /// Returns the parameter of the model that a shared variable is; none for copies of the first
+    /// state.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn model_parameter(self, index: usize) -> Option<usize> {
         self.free_indices.iter().position(|&place| place as usize == index)
     }
 
-    /// Writes free parameters over those that were set.
+    /// Overwrites the free parameters in `p`.
     #[inline(always)]
     pub(in crate::ocp) fn write_parameters<T: Real>(self, p: &mut [T], w: &[T]) {
         for (p, &place) in p.iter_mut().zip(self.free_indices) {
@@ -161,8 +164,8 @@ impl FreeParametersView<'_> {
         }
     }
 
-    /// The columns of a matrix over the parameters of the model that are of free ones, each with
-    /// which one it is; columns are `rows` long.
+    /// Returns the columns of free parameters of a matrix over the parameters of the model, each
+    /// with its index. Columns have `rows` elements.
     pub(in crate::ocp) fn free_columns<T>(
         self,
         matrix: &[T],
@@ -172,13 +175,14 @@ impl FreeParametersView<'_> {
         columns.filter_map(move |(parameter, column)| Some((self.index_of(parameter)?, column)))
     }
 
-    /// The elements of a gradient over the parameters of the model that are of free ones.
+    /// Returns the elements of free parameters of a gradient over the parameters of the model, each
+    /// with its index.
     pub(in crate::ocp) fn free_elements<T: Copy>(self, gradient: &[T]) -> impl Iterator<Item = (usize, T)> {
         let elements = gradient.iter().enumerate();
         elements.filter_map(move |(parameter, &value)| Some((self.index_of(parameter)?, value)))
     }
 
-    /// A step of the parameters of the model, from one of free ones.
+    /// Writes a step of the free parameters as a step of the parameters of the model.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn scatter_step<T: Real>(self, step: &mut [T], w: &[T]) {
         for (parameter, &place) in

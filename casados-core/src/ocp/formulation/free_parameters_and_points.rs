@@ -1,4 +1,4 @@
-//! A problem gets variables for parameters that are found, and rows for points inside of intervals.
+//! Free parameters and points inside intervals, which add variables and rows to a problem.
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
@@ -15,24 +15,24 @@ use alloc::vec::Vec;
 use core::ops::RangeBounds;
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// Frees a parameter of the model, or all that a name means: it is found together with states
-    /// and controls, the same at all stages, in a range, from a guess. Functions of it are costs
-    /// and constraints like all others, at the last stage too.
+    /// Frees a parameter of the model, or all parameters with this name: it is optimised together
+    /// with states and controls, has the same value at all stages, a range and a guess. Costs and
+    /// constraints may depend on it at every stage, including the last.
     ///
     /// In a solution it is a parameter ([`Trajectory::parameter`](crate::ocp::Trajectory)), with
-    /// bounds and multipliers. A parameter that is free already gets this range and this guess.
-    /// What was set for it by `set_parameters` is not used.
+    /// bounds and multipliers. A second call for the same parameter replaces range and guess.
+    /// Values from `set_parameters` are ignored for it.
     ///
-    /// The QP has a column for it at each stage, its recursion one right-hand side. Solvers are
-    /// made afterwards: dimensions change.
+    /// The QP has one more column per stage, its recursion one more right-hand side. Call this
+    /// before creating a solver: dimensions change.
     ///
     /// # Errors
     /// [`OcpError::UnknownParameter`]; [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`] of
-    /// the range; [`OcpError::OutOfRange`] of the guess; [`OcpError::OutOfMemory`]. Then nothing is
-    /// changed, but in the last case.
+    /// the range; [`OcpError::OutOfRange`] of the guess; [`OcpError::OutOfMemory`]. Except after
+    /// the last one the problem is unchanged.
     ///
     /// # Example
-    /// The spring that takes a mass over a metre in a second, with least effort.
+    /// The stiffness of the spring that moves a mass by a metre in a second, with least effort.
     /// ```
     /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
     /// use casados::prelude::*;
@@ -88,7 +88,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         Ok(self)
     }
 
-    /// Frees the end of a horizon that has a free one.
+    /// Frees the end time of a horizon with a free end.
     ///
     /// # Errors
     /// [`OcpError::FixedEndTime`], [`OcpError::Times`], [`OcpError::Unsupported`]; those of
@@ -108,25 +108,25 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         self.check_functions_for_free_end()
     }
 
-    /// Points inside of every interval, as parts of it, at which path constraints hold too, with
-    /// the bounds of the node before: what holds at nodes alone may be violated between them.
-    /// Bounds of states that are given afterwards hold there too, and those of algebraic states.
+    /// Sets points inside every interval, as fractions of it. Path constraints hold at these points
+    /// too, with the bounds of the node before: a constraint that holds at the nodes may be
+    /// violated between them. Bounds of states and algebraic states that are set later hold at the
+    /// points too.
     ///
-    /// Intervals are integrated from point to point, each piece by as many steps as the options of
-    /// the integrator say: states there are ends of steps, with exact derivatives of first and
-    /// second order. In a solution and in messages a constraint `Speed` at the part 0.5 is
-    /// `Speed@0.5`.
+    /// Each interval is integrated from point to point, each piece with the number of steps in the
+    /// options of the integrator. States at the points are therefore ends of steps, with exact
+    /// first and second derivatives. In solutions and messages a constraint `Speed` at the fraction
+    /// 0.5 is `Speed@0.5`.
     ///
-    /// It is called before bounds are given, and once. Solvers are made afterwards: dimensions
-    /// change.
+    /// Call this once, before setting bounds and before creating a solver: dimensions change.
     ///
     /// # Errors
-    /// [`OcpError::InvalidPoint`] where parts do not increase between 0 and 1;
-    /// [`OcpError::Unsupported`] of maps and lifted stages, and where there are bounds of states
-    /// or such points already; [`OcpError::OutOfMemory`].
+    /// [`OcpError::InvalidPoint`] if the fractions do not increase between 0 and 1;
+    /// [`OcpError::Unsupported`] for maps and lifted stages, and if states have bounds or points
+    /// are set already; [`OcpError::OutOfMemory`].
     ///
     /// # Example
-    /// A cart that comes with 1 m/s and stops before 0.3 m: where it turns round is no node.
+    /// A cart arrives with 1 m/s and stops before 0.3 m; it turns round between two nodes.
     /// ```
     /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
     /// use casados::prelude::*;
@@ -152,20 +152,20 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         self.set_inner_points(InnerPoints::with_points(parts)?)
     }
 
-    /// Holds the controls of every interval over so many pieces of it, as moves are blocked: costs
-    /// and path constraints are those of a finer horizon, whose controls are the same in a block.
-    /// Blocks of different lengths are intervals of different lengths
+    /// Holds the controls of every interval over this number of pieces (move blocking). Costs and
+    /// path constraints are those of a finer horizon whose controls are equal within a block. For
+    /// blocks of different lengths use intervals of different lengths
     /// ([`Horizon::nodes`](crate::ocp::Horizon::nodes)).
     ///
-    /// Pieces are of equal length, and points between them as those of [`inside`](Self::inside), by
-    /// which they are chosen too; running costs count each piece as long as it is, and a reference
-    /// is that of the interval. The QP has as many stages as there are moves.
+    /// Pieces have equal lengths; the points between them are set as by [`inside`](Self::inside).
+    /// Running costs weight each piece by its length; all pieces of an interval have its reference.
+    /// The number of stages of the QP is the number of blocks.
     ///
     /// # Errors
-    /// As [`inside`](Self::inside); [`OcpError::InvalidOption`] of no pieces at all.
+    /// As [`inside`](Self::inside); [`OcpError::InvalidOption`] for zero pieces.
     ///
     /// # Example
-    /// Forty pieces, ten moves.
+    /// Forty pieces, ten blocks.
     /// ```
     /// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
     /// use casados::prelude::*;
@@ -192,7 +192,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         self.set_inner_points(InnerPoints::with_points(&parts)?.with_costs_at_points())
     }
 
-    /// Gives intervals these points.
+    /// Rebuilds the problem with these points inside its intervals.
     fn set_inner_points(&mut self, inner: InnerPoints<T>) -> Result<&mut Self, OcpError> {
         let interval_count = self.intervals();
         let has_state_bounds = |k: usize| {

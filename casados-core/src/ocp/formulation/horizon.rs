@@ -9,7 +9,7 @@ use core::ops::{Bound, RangeBounds};
 
 /// The nodes in time.
 ///
-/// Nodes increase; times are those that the model sees, in its units.
+/// Times increase from node to node, in the units of the model's time.
 ///
 /// ```
 /// use casados::ocp::Horizon;
@@ -20,25 +20,25 @@ use core::ops::{Bound, RangeBounds};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Horizon<'a, T> {
-    /// Intervals of equal length, from time zero on.
+    /// Intervals of equal length, starting at time zero.
     Uniform {
-        /// How many.
+        /// The number of intervals.
         intervals: usize,
-        /// The length of each.
+        /// The length of an interval.
         length: T,
     },
-    /// The times of all nodes, one more than there are intervals.
+    /// The times of all nodes, one more than intervals.
     Nodes(&'a [T]),
-    /// From time zero to an end that is found.
+    /// From time zero to a free end time.
     Free {
-        /// How many intervals.
+        /// The number of intervals.
         intervals: usize,
-        /// Where nodes are, as parts of the whole from 0 to 1, one more than there are intervals;
-        /// empty if these are of equal length.
+        /// The nodes as fractions of the horizon, from 0 to 1, one more than intervals; empty for
+        /// intervals of equal length.
         parts: &'a [T],
         /// The range of the end time.
         range: [T; 2],
-        /// Its guess.
+        /// The guess of the end time.
         guess: T,
     },
 }
@@ -54,14 +54,14 @@ impl<'a, T: Real> Horizon<'a, T> {
     pub fn nodes(times: &'a [T]) -> Self {
         Self::Nodes(times)
     }
-    /// From time zero to an end that is found in a range, in intervals of equal length. The model
-    /// says which of its parameters is the duration, and is otherwise as it was, in its own units
-    /// of time; so are costs, constraints and the times of the solution.
+    /// A free end time in a range, with intervals of equal length from time zero. The model
+    /// declares one of its parameters as its duration (`#[ode(duration = p)]`), and keeps its units
+    /// of time, as do costs, constraints and the times of the solution.
     ///
-    /// In a running cost each interval counts as long as it is, with derivatives by the end time.
+    /// A running cost weights each interval by its length, and has derivatives by the end time.
     ///
     /// # Example
-    /// A car that goes a hundred metres from rest to rest, with at most 2 m/s²: in `2 √50` s.
+    /// A car covers a hundred metres from rest to rest with at most 2 m/s²: in `2 √50` s.
     /// ```
     /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
     /// use casados::prelude::*;
@@ -87,13 +87,13 @@ impl<'a, T: Real> Horizon<'a, T> {
     pub fn free(intervals: usize, range: impl RangeBounds<T>, guess: T) -> Self {
         Self::Free { intervals, parts: &[], range: range_limits(&range), guess }
     }
-    /// As [`Horizon::free`], with nodes at these parts of the whole, from 0 to 1.
+    /// As [`Horizon::free`], with nodes at these fractions of the horizon, from 0 to 1.
     #[must_use]
     pub fn free_nodes(parts: &'a [T], range: impl RangeBounds<T>, guess: T) -> Self {
         let intervals = parts.len().saturating_sub(1);
         Self::Free { intervals, parts, range: range_limits(&range), guess }
     }
-    /// How many intervals.
+    /// Returns the number of intervals.
     #[must_use]
     pub fn intervals(&self) -> usize {
         match self {
@@ -101,9 +101,10 @@ impl<'a, T: Real> Horizon<'a, T> {
             Self::Nodes(times) => times.len().saturating_sub(1),
         }
     }
-    /// Nodes with these intervals halved: of `nodes` as [`Ocp::times`](crate::ocp::Ocp::times) has
-    /// them, for [`Horizon::nodes`], or [`Horizon::free_nodes`] where the end is free. Intervals
-    /// that there are not are passed by.
+    /// Returns the nodes with these intervals halved. `nodes` are those of
+    /// [`Ocp::times`](crate::ocp::Ocp::times); the result is for [`Horizon::nodes`], or for
+    /// [`Horizon::free_nodes`] if the end is free. Indices of intervals that do not exist are
+    /// ignored.
     ///
     /// ```
     /// use casados::ocp::Horizon;
@@ -132,7 +133,7 @@ impl<'a, T: Real> Horizon<'a, T> {
             Self::Free { parts, .. } => get(parts, node),
         }
     }
-    /// Writes the times.
+    /// Writes the times of the nodes.
     ///
     /// # Errors
     /// [`OcpError::Times`]
@@ -156,7 +157,7 @@ impl<'a, T: Real> Horizon<'a, T> {
     }
 }
 
-/// The sides of a range.
+/// Returns the limits of a range.
 pub(in crate::ocp) fn range_limits<T: Real>(range: &impl RangeBounds<T>) -> [T; 2] {
     let infinity = T::from_f64(f64::INFINITY);
     let limit = |bound: Bound<&T>, none: T| match bound {

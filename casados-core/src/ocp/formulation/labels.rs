@@ -1,4 +1,4 @@
-//! What the numbers of a problem are called where they are refused: as the model does.
+//! Labels of the elements of a problem in errors, by the names of the model.
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::Part;
@@ -29,14 +29,15 @@ fn name_and_index(names: &[&'static str], index: usize) -> (&'static str, usize)
     (names.get(index).copied().unwrap_or(""), index)
 }
 
-/// What a constraint is called: as its function, with the output where that has several.
+/// The name of a constraint: its function, with the output if it has several.
 pub(in crate::ocp) struct OutputName {
     function: &'static str,
     output: Option<usize>,
 }
 
 impl OutputName {
-    /// Whether a name means it: that of the function means all of its outputs.
+    /// Returns whether a name denotes this output; the name of the function denotes all of its
+    /// outputs.
     pub fn matches(&self, name: &str) -> bool {
         let Some(rest) = name.strip_prefix(self.function) else { return false };
         let index = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
@@ -44,7 +45,7 @@ impl OutputName {
     }
 }
 
-/// The name of a row.
+/// Returns the name of a row.
 pub(in crate::ocp) fn output_name<C: Constraints<S, T>, S: Shape, T: Real>(row: usize) -> OutputName {
     let (function, output) = C::name(row);
     let has_others = (0..C::ROWS).map(C::name).any(|(other, output)| other == function && output > 0);
@@ -61,28 +62,28 @@ impl fmt::Display for OutputName {
 }
 
 impl Labels {
-    /// Of states: of the iterate, of the start, or of bounds.
+    /// Labels of states, of the initial state or of bounds of states.
     pub fn states<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| name_and_index(model_names::<P, T>().x, index) }
     }
-    /// Of controls.
+    /// Labels of controls.
     pub fn controls<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| name_and_index(model_names::<P, T>().u, index) }
     }
-    /// Of algebraic states.
+    /// Labels of algebraic states.
     pub fn algebraic<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| name_and_index(model_names::<P, T>().z, index) }
     }
-    /// Of parameters.
+    /// Labels of parameters.
     pub fn parameters<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| name_and_index(model_names::<P, T>().p, index) }
     }
-    /// Of constraints.
+    /// Labels of constraints.
     pub fn constraints<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         let name = if part == Part::TerminalBounds { P::Terminal::name } else { P::Path::name };
         Self { part, stage, name }
     }
-    /// Of references.
+    /// Labels of references.
     pub fn references<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         let name = if part == Part::TerminalReference { P::TerminalCost::name } else { P::StageCost::name };
         Self { part, stage, name }
@@ -91,8 +92,8 @@ impl Labels {
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// What a row behind those of path constraints at nodes is called, with its place, and its
-    /// unit.
+    /// Returns the name, with its point, and the unit of a row that follows the path constraints at
+    /// the nodes.
     pub(in crate::ocp) fn inner_row_name_and_unit(&self, index: usize) -> (String, &'static str) {
         let units = <P::Dynamics as Dynamics<T>>::NAMES.units;
         let unit_at =

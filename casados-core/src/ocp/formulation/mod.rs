@@ -1,14 +1,16 @@
-//! What a problem is: functions, bounds, a horizon, and the memory of all of it.
+//! The formulation of a problem: functions, bounds, horizon, and their memory.
 //!
 //! | | |
 //! | --- | --- |
-//! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
-//! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
-//! | `instance/` | a problem on a horizon, with memory, and points inside of its intervals |
-//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them and points inside of intervals |
-//! | `bounds`, `limit`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
-//! | `names`, `labels`, `check`, `error` | refusals by name |
-//! | `print` | a problem as mathematics |
+//! | `functions/` | traits of dynamics, costs and constraints; costs and constraints |
+//! | `problem`, `horizon` | the functions of a problem, and the times of its nodes |
+//! | `instance/` | a problem on a horizon, with memory, and points inside its intervals |
+//! | `free_parameters` | free parameters and end times |
+//! | `free_parameters_and_points` | adding free parameters, and points inside intervals |
+//! | `bounds`, `variable_bounds`, `soften` | bounds and penalties |
+//! | `coupling`, `arrival` | couplings and arrival cost |
+//! | `names`, `labels`, `check`, `error` | errors by name |
+//! | `print` | a problem as formulas |
 
 pub(in crate::ocp) mod arrival;
 pub(in crate::ocp) mod bounds;

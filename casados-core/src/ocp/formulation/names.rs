@@ -1,4 +1,4 @@
-//! What the variables of a model are called.
+//! Names of the variables of a model.
 
 use crate::structure::Units;
 
@@ -22,7 +22,7 @@ use crate::structure::Units;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Names {
-    /// Of the model.
+    /// The name of the model.
     pub model: &'static str,
     /// States.
     pub x: &'static [&'static str],
@@ -32,30 +32,31 @@ pub struct Names {
     pub u: &'static [&'static str],
     /// Parameters.
     pub p: &'static [&'static str],
-    /// Their units, as far as the model says.
+    /// The units of the variables, where the model gives them.
     pub units: Units,
-    /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`.
+    /// The parameter that scales the time of the model, `#[ode(duration = p)]`.
     pub duration: Option<usize>,
-    /// Which controls are rates of linear ones, which are states behind those of the model.
+    /// The controls that are rates of linear controls. Linear controls are states that follow the
+    /// model's states.
     pub linear: &'static [u32],
-    /// How many integrals are the last states.
+    /// The number of integrals, which are the last states.
     pub integrals: usize,
 }
 
 impl Names {
-    /// How many states the model has without linear controls and integrals.
+    /// Returns the number of states without linear controls and integrals.
     pub(in crate::ocp) const fn model_state_count(&self) -> usize {
         self.x.len() - self.linear.len() - self.integrals
     }
 
-    /// What a control is called, of a rate the control that has it.
+    /// Returns the name of a control; for a rate, the name of the linear control.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn control_name(&self, control: usize) -> &'static str {
         let state = self.linear_state(control).and_then(|state| self.x.get(state));
         state.or(self.u.get(control)).copied().unwrap_or("")
     }
 
-    /// The state that a linear control is.
+    /// Returns the index of a linear control among the states.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn linear_state(&self, control: usize) -> Option<usize> {
         let position = self.linear.iter().position(|&linear| linear as usize == control)?;

@@ -1,4 +1,4 @@
-//! A problem as mathematics, with names, bounds and sizes.
+//! Display of a problem: formulas, names, bounds and sizes.
 
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
@@ -17,13 +17,13 @@ use crate::shape::Shape;
 use core::fmt::{self, Display, Formatter};
 use core::ops::Range;
 
-/// More names than this are not listed.
+/// The largest number of names in a list.
 const MAX_LISTED_NAMES: usize = 8;
-/// More bounds than this of one variable, which differ from stage to stage, are not listed.
+/// The largest number of different bounds of one variable over the stages in a list.
 const MAX_LISTED_BOUNDS: usize = 4;
 
-/// The objective, the dynamics, bounds and constraints by name, with the stages at which they hold
-/// and the penalties of soft ones, and how large the problem is.
+/// Prints the objective, the dynamics, bounds and constraints by name, with their stages and the
+/// penalties of soft ones, and the dimensions of the problem.
 ///
 /// ```
 /// use casados::ocp::{Constraint, Horizon, LeastSquaresCost, Map, Problem};
@@ -190,7 +190,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 writeln!(f)?;
             }
         }
-        // Bounds in the QP are those of what is linear.
+        // The QP has the bounds of the linearised constraints; these are the bounds as given.
         let layout = self.layout();
         let [lower, upper] = constraint_bounds::<P, T>(self.data.as_ref(), layout);
         let constraint = |k: usize, row: usize| {
@@ -222,7 +222,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// What there is beside the dynamics.
+/// Numbers of constraints other than the dynamics.
 #[derive(Default)]
 struct ConstraintCounts {
     equations: usize,
@@ -235,7 +235,7 @@ struct ConstraintCounts {
 struct BoundPair {
     lower: f64,
     upper: f64,
-    /// Linear and quadratic.
+    /// Linear and quadratic penalty.
     lower_penalty: [f64; 2],
     upper_penalty: [f64; 2],
 }
@@ -297,7 +297,7 @@ impl BoundPair {
             [true, true] if self.lower_penalty == self.upper_penalty => {
                 print_penalty(f, "soft", self.lower_penalty)
             }
-            // The only side there is.
+            // The only bound.
             [true, false] if !has[1] => print_penalty(f, "soft", self.lower_penalty),
             [false, true] if !has[0] => print_penalty(f, "soft", self.upper_penalty),
             [below, above] => {
@@ -322,7 +322,7 @@ fn print_penalty(f: &mut Formatter<'_>, what: &str, [linear, quadratic]: [f64; 2
     }
 }
 
-/// The bounds of a variable: a line for stages one after the other at which they are the same.
+/// Prints the bounds of a variable, with one line for consecutive stages with equal bounds.
 fn print_bounds_over_stages(
     f: &mut Formatter<'_>,
     name: &dyn Display,
@@ -358,7 +358,7 @@ fn print_bounds_over_stages(
     }
 }
 
-/// Names, of many the first and the last ones.
+/// Prints names; of a long list the first and the last ones.
 fn print_names(f: &mut Formatter<'_>, names: &[&str]) -> fmt::Result {
     let half = MAX_LISTED_NAMES / 2;
     for (i, name) in names.iter().enumerate() {
@@ -372,7 +372,7 @@ fn print_names(f: &mut Formatter<'_>, names: &[&str]) -> fmt::Result {
     Ok(())
 }
 
-/// The iterate, and nothing of the QP.
+/// Prints the iterate without the QP.
 impl<P, T, D, M> fmt::Debug for Ocp<P, T, D, M>
 where
     P: Formulation<T>,

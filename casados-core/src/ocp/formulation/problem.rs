@@ -1,4 +1,4 @@
-//! What a problem consists of.
+//! The functions of a problem.
 
 use crate::ocp::formulation::functions::argument_checks::{HasArgumentsOf, IsConstraint, IsCost};
 use crate::ocp::formulation::functions::constraint::Constraints;
@@ -7,8 +7,8 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Dynamics, costs and constraints. Each call of the builder puts a function in its place; what is
-/// not said is not there.
+/// Dynamics, costs and constraints. Each call of the builder sets one function; parts that are not
+/// set are absent.
 ///
 /// A problem on a horizon is an [`Ocp`](crate::ocp::Ocp).
 ///
@@ -38,29 +38,29 @@ use crate::shape::Shape;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Problem<D, L = (), E = (), G = (), H = ()> {
-    /// What happens between two nodes.
+    /// The dynamics of an interval.
     pub dynamics: D,
-    /// The cost of the stages but the last.
+    /// The cost of every stage but the last.
     pub stage_cost: L,
     /// The cost of the last stage.
     pub terminal_cost: E,
-    /// The constraints of the stages but the last.
+    /// The constraints of every stage but the last.
     pub path: G,
     /// The constraints of the last stage.
     pub terminal: H,
-    /// Whether stage costs are multiplied by the lengths of intervals.
+    /// Whether stage costs are multiplied by the lengths of the intervals.
     pub(in crate::ocp) running: bool,
 }
 
 impl<D> Problem<D> {
-    /// Dynamics without costs and constraints.
+    /// A problem with dynamics, without costs and constraints.
     pub fn new(dynamics: D) -> Self {
         Self { dynamics, stage_cost: (), terminal_cost: (), path: (), terminal: (), running: false }
     }
 }
 
 impl<D, L, E, G, H> Problem<D, L, E, G, H> {
-    /// The cost of every stage but the last, as it is.
+    /// Sets the cost of every stage but the last, without a factor.
     pub fn stage_cost<T: Real, C>(self, stage_cost: C) -> Problem<D, C, E, G, H>
     where
         D: Dynamics<T>,
@@ -69,7 +69,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let Self { dynamics, terminal_cost, path, terminal, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running: false }
     }
-    /// The cost of every stage but the last, times the length of its interval.
+    /// Sets the cost of every stage but the last, times the length of its interval.
     pub fn running_cost<T: Real, C>(self, cost: C) -> Problem<D, C, E, G, H>
     where
         D: Dynamics<T>,
@@ -77,7 +77,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     {
         Problem { running: true, ..self.stage_cost(cost) }
     }
-    /// The cost of the last stage.
+    /// Sets the cost of the last stage.
     pub fn terminal_cost<T: Real, C>(self, terminal_cost: C) -> Problem<D, L, C, G, H>
     where
         D: Dynamics<T>,
@@ -86,7 +86,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let Self { dynamics, stage_cost, path, terminal, running, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
     }
-    /// Constraints of every stage but the last.
+    /// Sets the constraints of every stage but the last.
     pub fn path_constraints<T: Real, C>(self, path: C) -> Problem<D, L, E, C, H>
     where
         D: Dynamics<T>,
@@ -95,7 +95,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let Self { dynamics, stage_cost, terminal_cost, terminal, running, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
     }
-    /// Constraints of the last stage.
+    /// Sets the constraints of the last stage.
     pub fn terminal_constraints<T: Real, C>(self, terminal: C) -> Problem<D, L, E, G, C>
     where
         D: Dynamics<T>,
@@ -106,9 +106,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     }
 }
 
-/// The types of a [`Problem`] under one name.
+/// The types of a [`Problem`] in one trait.
 ///
-/// What solvers take, so functions of one's own take it too:
+/// Solvers are generic over it, and so are functions that take a problem:
 ///
 /// ```
 /// use casados::ocp::{Formulation, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem};
@@ -144,33 +144,35 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
 pub trait Formulation<T: Real> {
     /// Dimensions.
     type Shape: Shape;
-    /// What happens between two nodes.
+    /// The dynamics of an interval.
     type Dynamics: Dynamics<T, Shape = Self::Shape>;
-    /// The cost of the stages but the last.
+    /// The cost of every stage but the last.
     type StageCost: Cost<Self::Shape, T>;
     /// The cost of the last stage.
     type TerminalCost: Cost<Self::Shape, T>;
-    /// The constraints of the stages but the last.
+    /// The constraints of every stage but the last.
     type Path: Constraints<Self::Shape, T>;
     /// The constraints of the last stage.
     type Terminal: Constraints<Self::Shape, T>;
 
-    /// All of them.
+    /// Returns all functions, mutably.
     #[allow(clippy::type_complexity)]
     fn parts(
         &mut self,
     ) -> &mut Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
 
-    /// All of them, to be looked at.
+    /// Returns all functions.
     #[allow(clippy::type_complexity)]
     fn parts_ref(
         &self,
     ) -> &Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
 }
 
-/// A [`Formulation`] whose dynamics have second derivatives: what every solver takes.
+/// A [`Formulation`] whose dynamics have second derivatives, as every solver with exact Hessians
+/// requires.
 ///
-/// Short for `Formulation<T, Dynamics: SecondOrder<T>> + Clone`, and implemented for all of these.
+/// It abbreviates `Formulation<T, Dynamics: SecondOrder<T>> + Clone`, and is implemented for all
+/// types with these bounds.
 ///
 /// ```
 /// use casados::ocp::{ExactFormulation, GeneralCost, HeapIpm, HeapOcp, Horizon, OcpError, Problem};

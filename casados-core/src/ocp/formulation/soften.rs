@@ -18,18 +18,17 @@ use core::ops::RangeBounds;
 const BOTH_SIDES: &[Side] = &[Side::Lower, Side::Upper];
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes bounds soft, of states, controls or constraints: leaving one by `e` costs
+    /// Makes bounds of states, controls or constraints soft: a violation `e` costs
     /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
     ///
-    /// Names are those of variables as in [`Ocp::bound`], or those of constraints: their function,
-    /// and the output if one of several is meant, `Corner[2]`. Path constraints are at all stages
-    /// but the last, terminal ones at that. [`Ocp::soften_lower`] and [`Ocp::soften_upper`] are for
-    /// one side.
+    /// A name denotes variables as in [`Ocp::bound`], or constraints: their function, or one of its
+    /// outputs, `Corner[2]`. Path constraints exist at all stages but the last, terminal
+    /// constraints at the last. [`Ocp::soften_lower`] and [`Ocp::soften_upper`] soften one side.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
-    /// [`OcpError::InvalidValue`]; [`OcpError::NoBound`] if nothing that the name means has a bound
-    /// at these stages. Then no penalty is changed.
+    /// [`OcpError::InvalidValue`]; [`OcpError::NoBound`] if no variable or constraint with this
+    /// name has a bound at these stages. After an error no penalty is changed.
     pub fn soften(
         &mut self,
         name: &str,
@@ -40,7 +39,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.soften_sides(name, stages, BOTH_SIDES, [linear, quadratic])
     }
 
-    /// As [`Ocp::soften`], of lower bounds alone.
+    /// As [`Ocp::soften`], for lower bounds only.
     ///
     /// # Errors
     /// As [`Ocp::soften`].
@@ -54,14 +53,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.soften_sides(name, stages, &[Side::Lower], [linear, quadratic])
     }
 
-    /// As [`Ocp::soften`], of upper bounds alone.
+    /// As [`Ocp::soften`], for upper bounds only.
     ///
     /// # Errors
     /// As [`Ocp::soften`].
     ///
     /// # Example
-    /// A pull towards 3 with the force `3 − x`: the upper bound 1 gives way where that is more than
-    /// its penalty.
+    /// The cost pulls towards 3 with the force `3 − x`: the upper bound 1 is violated until the
+    /// force is its penalty.
     /// ```
     /// use casados::ocp::{Constraint, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -119,7 +118,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Where the stages end, if there was no bound.
+    /// Softens bounds of variables. Returns the end of the range of stages if there is no bound.
     fn soften_variables(
         &mut self,
         name: &str,
@@ -159,7 +158,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(None)
     }
 
-    /// Where the stages end, if there was no bound.
+    /// Softens bounds of constraints. Returns the end of the range of stages if there is no bound.
     fn soften_constraints(
         &mut self,
         name: &str,
@@ -186,7 +185,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 true => output_name::<P::Terminal, _, T>(row).matches(name),
                 false => output_name::<P::Path, _, T>(row).matches(name),
             });
-            // At the node, and at every point.
+            // The rows at the node and at every point.
             let point_rows =
                 move |row: usize| (1..=points).map(move |point| inner_path_row::<P, T>(row, point));
             matching_rows.flat_map(move |row| core::iter::once(row).chain(point_rows(row)))

@@ -1,4 +1,4 @@
-//! Bounds of variables by name, at nodes and at points inside of intervals.
+//! Bounds of variables by name, at nodes and at points inside intervals.
 
 use crate::ocp::formulation::check::{first_stage, stage_range};
 use crate::ocp::formulation::error::{OcpError, Part};
@@ -19,20 +19,20 @@ use core::ops::{Range, RangeBounds};
 impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T> + AsMut<[T]>>
     Ocp<P, T, D, M>
 {
-    /// Bounds of a state, control, algebraic state or free parameter, or of all of them that a name
-    /// means (`u` means `u[0]`, `u[1]`, …), at some stages: `..` are all of them, the last one has
-    /// no controls and no algebraic states, and free parameters are the same at all of them. An
-    /// infinite bound is none. While the initial state is fixed, bounds of states do not touch
-    /// stage 0.
+    /// Sets the bounds of a state, control, algebraic state or free parameter, or of all variables
+    /// with this name (`u` denotes `u[0]`, `u[1]`, …), at these stages; `..` denotes all stages.
+    /// The last stage has no controls and no algebraic states; free parameters are the same at all
+    /// stages. An infinite bound is no bound. While the initial state is fixed, bounds of states do
+    /// not apply to stage 0.
     ///
-    /// Bounds of states hold at points inside of intervals too, where there are some
-    /// ([`Ocp::inside`]), and so do those of algebraic states. An algebraic state gets a row of the
-    /// QP at each stage with its first bounds: solvers are made afterwards.
+    /// Bounds of states and algebraic states hold at points inside intervals too ([`Ocp::inside`]).
+    /// The first bounds of an algebraic state add a row of the QP to each stage: set them before
+    /// creating a solver.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
     /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]: then no bound is changed.
-    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] of algebraic states in given memory.
+    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] for algebraic states in given memory.
     pub fn bound(
         &mut self,
         name: &str,
@@ -66,7 +66,7 @@ impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T
         Ok(self)
     }
 
-    /// Makes rows for what a name means, where something can have rows and has none.
+    /// Adds the rows that bounds of the variables with this name require.
     #[cfg(feature = "alloc")]
     fn add_missing_rows(
         &mut self,
@@ -94,7 +94,7 @@ impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The stages at which rows of points are meant, by what was found.
+    /// Returns the stages of the rows of algebraic states, or of states at points.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
@@ -112,7 +112,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The rows of variables at points that a name means.
+/// Returns the rows of variables with this name at points.
 pub(in crate::ocp) fn matching_inner_rows<'a, P: Formulation<T>, T: Real>(
     inner: &'a crate::ocp::formulation::instance::inner_points::InnerPoints<T>,
     name: &'a str,

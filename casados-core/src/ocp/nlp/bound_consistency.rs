@@ -1,4 +1,4 @@
-//! Bounds that contradict each other before anything is evaluated: those of variables that are one.
+//! Contradictory hard bounds of coupled variables, found before any function is evaluated.
 
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -6,7 +6,7 @@ use crate::ocp::solution::outcome::Status;
 use crate::qp::{Bounds, QpField, Side, StageDims, marked_indices};
 use crate::scalar::Real;
 
-/// The largest hard lower bound and the least hard upper bound, each with its stage.
+/// The largest hard lower bound and the smallest hard upper bound, each with its stage.
 #[derive(Clone, Copy)]
 struct BoundIntersection {
     lower: (f64, usize),
@@ -33,9 +33,9 @@ impl BoundIntersection {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Infeasible, if hard bounds of a shared control at several stages, or those of a periodic
-    /// state at both ends, have no number in common: the lower bound is violated by the distance
-    /// between both where the upper one holds.
+    /// Returns [`Status::Infeasible`] if the intersection of the hard bounds is empty: of a shared
+    /// control over all stages, or of a periodic state over both ends. The violation is the
+    /// distance between the largest lower and the smallest upper bound.
     pub(in crate::ocp) fn contradictory_bounds(&self, tolerance: f64) -> Option<Status> {
         let (qp, last) = (self.qp.view(), self.intervals());
         let controls = marked_indices(qp.shared()).map(|index| {

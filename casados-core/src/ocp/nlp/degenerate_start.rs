@@ -1,32 +1,33 @@
-//! A start at which the gradient of a violated constraint vanishes: its linearisation says nothing
-//! of where it holds, as that of `u₁² + u₂² = 1` at `u = 0`.
+//! Degenerate start: the gradient of a violated constraint vanishes, so that its linearisation has
+//! no solution, as for `u₁² + u₂² = 1` at `u = 0`.
 
 use crate::linalg::dot;
 use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::program::Program;
-use crate::qp::{Bounds, Places, Solution, StageDims, part};
+use crate::qp::{Bounds, Solution, StageDims, StageOffsetsIter, part};
 use crate::scalar::Real;
 
-/// The gradient vanishes where it changes the constraint by no more than this part of the
-/// violation, if a variable changes by its size or by one.
+/// A gradient counts as vanishing if the change of each variable by its size, or by one, changes
+/// the constraint by at most this fraction of the violation.
 const VANISHING_GRADIENT: f64 = 1e-8;
-/// The first variable changes by this part of its size, the second by half of that, and so on: the
-/// point lies on no axis and no diagonal.
+/// The relative perturbation of the first variable; variable `i` (from zero) is perturbed by
+/// `1 / (i + 1)` of it, so that the point lies on no axis and no diagonal.
 const RELATIVE_PERTURBATION: f64 = 0.1;
 
-/// Which variables are perturbed.
+/// The variables that are perturbed.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum PerturbedVariables {
     Controls,
-    /// Those that are not given.
+    /// All states except a fixed initial state.
     States,
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Whether there is such a constraint at the iterate, where the QP was written.
+    /// Whether the gradient of a violated constraint vanishes at the iterate. The QP must be
+    /// written there.
     pub(super) fn has_vanishing_gradient(&self) -> bool {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        Places::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
+        StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
             let (view, stage_variables) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();
             lower.iter().zip(upper).enumerate().any(|(i, (&lower, &upper))| {
@@ -40,8 +41,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         })
     }
 
-    /// Moves variables of the iterate a little, inside of their bounds, by the same at all stages:
-    /// shared controls stay equal.
+    /// Perturbs variables of the iterate within their bounds, equally at all stages: shared
+    /// controls remain equal.
     pub(super) fn perturb_variables(&mut self, which: PerturbedVariables) {
         let fixed = self.initial_state == InitialState::Fixed;
         let Self { qp, iterate, .. } = self;
@@ -60,11 +61,12 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// Moves the iterate, where the QP was written, to points beside it until no such gradient
-    /// vanishes; whether it did. Otherwise the iterate is as it was, from `copy`.
+    /// Perturbs the iterate, where the QP was written, until no gradient of a violated constraint
+    /// vanishes. Returns whether the iterate has been perturbed; otherwise the iterate is restored
+    /// from `copy`.
     ///
     /// # Errors
-    /// That of the linearisation at the iterate.
+    /// The error of the linearisation at the iterate.
     pub(super) fn leave_degenerate_start<E>(
         &mut self,
         copy: &mut Solution<T, D, M>,

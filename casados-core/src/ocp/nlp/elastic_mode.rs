@@ -1,5 +1,4 @@
-//! Elastic mode: bounds of states and constraints get linear penalties, so that a QP has a
-//! solution.
+//! Elastic mode: bounds of states and constraints get linear penalties, so that the QP is feasible.
 
 use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::program::Program;
@@ -7,7 +6,7 @@ pub(in crate::ocp) use crate::qp::Violation as Worst;
 use crate::qp::{StageDims, largest_violation, padded_len};
 use crate::scalar::Real;
 
-/// How many numbers remember the linear penalties.
+/// The length of the memory for the linear penalties.
 pub(in crate::ocp) const fn penalty_memory_len(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (0_usize, dims);
     while let Some((first, others)) = rest.split_first() {
@@ -22,7 +21,7 @@ const fn row_count(dims: StageDims) -> usize {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Remembers all linear penalties: pairs of those of lower and upper bounds.
+    /// Saves all linear penalties, as pairs of lower and upper bound.
     pub(in crate::ocp) fn save_penalties(&self, saved_penalties: &mut [T]) {
         let mut pairs = saved_penalties.as_chunks_mut().0.iter_mut();
         for stage in self.qp().stages() {
@@ -35,8 +34,9 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// Writes them as they were, or with a number over the unit of the row, if there are units, in
-    /// place of infinite ones: of states but those at the start, and of constraints.
+    /// Restores the saved penalties. With an `elastic_penalty` the infinite ones of constraints,
+    /// and of states except the initial one, become `elastic_penalty / unit` of the row (or
+    /// `elastic_penalty`, without units).
     pub(in crate::ocp) fn set_penalties(
         &mut self,
         saved_penalties: &[T],
@@ -68,7 +68,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// Zero as the linear penalty of all bounds but equations.
+    /// Sets the linear penalties of all inequalities to zero; equations keep theirs.
     pub(in crate::ocp) fn ignore_inequalities(&mut self) {
         for mut stage in self.qp.stages_mut() {
             for kind in 0..3 {
@@ -86,8 +86,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// The largest violation, in units if there are any, of a bound that is hard, by the penalties
-    /// that are remembered, and the sum of all of them as they are.
+    /// Returns the largest violation of a bound that is hard according to the saved penalties, in
+    /// units if there are any, and the unscaled sum of these violations.
     pub(in crate::ocp) fn largest_hard_violation(
         &self,
         saved_penalties: &[T],

@@ -1,15 +1,15 @@
-//! The filter: pairs of objective and violation that no later iterate may be worse than.
+//! The filter: pairs of objective and violation that must not dominate a later iterate.
 //!
 //! R. Fletcher, S. Leyffer, Math. Program. 91 (2002); A. Wächter, L. T. Biegler, Math. Program. 106
-//! (2006), section 2.3, whose letters these are.
+//! (2006), section 2.3, whose symbols are used.
 
 use crate::scalar::Scalar;
 
 /// Objective and violation at a point.
 ///
-/// The objective has the penalties of soft bounds, in an interior point also the barrier (`φ`); the
-/// violation (`θ`) is the sum of all violations of what is hard, in a merit function each times its
-/// weight.
+/// The objective includes the penalties of soft bounds, and in an interior point the barrier (`φ`).
+/// The violation (`θ`) is the sum of all violations of hard constraints, weighted in a merit
+/// function.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::ocp) struct FilterPair {
     pub objective: f64,
@@ -21,18 +21,18 @@ impl FilterPair {
         self.objective.is_finite() && self.violation.is_finite()
     }
 
-    /// Both in a unit of forces.
+    /// The pair in units of the objective.
     pub fn divided_by(self, force: f64) -> Self {
         Self { objective: self.objective / force, violation: self.violation / force }
     }
 
-    /// The merit function, where violations have their weights.
+    /// The merit function `objective + violation`, with weighted violations.
     pub fn merit(&self) -> f64 {
         self.objective + self.violation
     }
 
-    /// Whether violation or objective are smaller by a margin: `γ_θ` and `γ_φ`, parts of the
-    /// violation. Differences of the objective up to `noise` are none.
+    /// Whether the violation or the objective is smaller by a margin of `γ_θ` or `γ_φ` times the
+    /// violation. Increases of the objective up to `noise` are rounding errors.
     pub fn is_acceptable_to(&self, other: &Self, noise: f64) -> bool {
         self.violation <= (1.0 - GAMMA_THETA) * other.violation
             || self.objective <= other.objective - GAMMA_PHI * other.violation + noise
@@ -46,8 +46,8 @@ impl core::ops::AddAssign for FilterPair {
     }
 }
 
-/// Whether a step of this length is expected to make the objective far smaller than there is
-/// violation: then the objective decides (equation (19)).
+/// The switching condition (equation (19)): the predicted decrease of the objective is large
+/// relative to the violation, so that the objective must decrease sufficiently.
 pub(in crate::ocp) fn switching_condition_holds(length: f64, slope: f64, violation: f64) -> bool {
     slope < 0.0 && length * Scalar::powf(-slope, S_PHI) > Scalar::powf(violation, S_THETA)
 }
@@ -59,9 +59,9 @@ pub(in crate::ocp) const S_THETA: f64 = 1.1;
 /// `γ_θ` and `γ_φ`
 pub(in crate::ocp) const GAMMA_THETA: f64 = 1e-5;
 pub(in crate::ocp) const GAMMA_PHI: f64 = 1e-5;
-/// `η_φ`, as Armijo's constant usually is.
+/// `η_φ`, Armijo's constant.
 pub(in crate::ocp) const ETA_PHI: f64 = 1e-4;
-/// Entries; the oldest one is forgotten when there are more.
+/// The capacity of the filter; the oldest entry is overwritten.
 const MAX_FILTER_ENTRIES: usize = 64;
 
 /// See the [module](self).
@@ -69,12 +69,12 @@ const MAX_FILTER_ENTRIES: usize = 64;
 pub(in crate::ocp) struct Filter {
     entries: [FilterPair; MAX_FILTER_ENTRIES],
     insertion_count: usize,
-    /// `θ_max`: no iterate may violate more.
+    /// `θ_max`: the largest acceptable violation.
     theta_max: f64,
 }
 
 impl Filter {
-    /// An empty one.
+    /// An empty filter with `θ_max`.
     pub fn new(largest_violation: f64) -> Self {
         Self {
             entries: [FilterPair::default(); MAX_FILTER_ENTRIES],
@@ -83,19 +83,20 @@ impl Filter {
         }
     }
 
-    /// Forgets all entries: their objectives are others.
+    /// Removes all entries, whose objectives are no longer comparable.
     pub fn clear(&mut self) {
         self.insertion_count = 0;
     }
 
-    /// Whether a point is better than every entry.
+    /// Whether the violation is at most `θ_max`, and every entry accepts the point.
     pub fn is_acceptable(&self, trial_pair: &FilterPair, noise: f64) -> bool {
         let mut entries = self.entries.iter().take(self.insertion_count.min(MAX_FILTER_ENTRIES));
         trial_pair.violation <= self.theta_max
             && entries.all(|entry| trial_pair.is_acceptable_to(entry, noise))
     }
 
-    /// Whether a point is better than the iterate, which is an entry then.
+    /// Returns whether the point is acceptable to the iterate; if so, adds the iterate to the
+    /// filter.
     pub fn augment_if_improved(
         &mut self,
         trial_pair: &FilterPair,

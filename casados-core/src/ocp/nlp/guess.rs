@@ -1,4 +1,4 @@
-//! Where a run begins.
+//! Linearisation at the guess.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
@@ -7,14 +7,14 @@ use crate::qp::{Bounds, Solution, StageDims};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Linearises at the guess; where something has no value there, at the point nearest to it that
-    /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
+    /// Linearises at the guess. If a function is not finite there, projects the guess onto the
+    /// bounds of states and controls; `copy` holds the guess meanwhile.
     ///
-    /// Where the gradient of a violated constraint vanishes, the start is a point beside it, if it
-    /// `perturbs`. Whether it is.
+    /// Perturbs a guess at which the gradient of a violated constraint vanishes, if `may_perturb`.
+    /// Returns whether it has been perturbed.
     ///
     /// # Errors
-    /// That at the guess, if there is none at that point either.
+    /// The error at the guess, if the projected guess fails too.
     pub(in crate::ocp) fn linearise_guess(
         &mut self,
         mut linearise: impl FnMut(&mut Self) -> Result<(), OcpError>,
@@ -39,7 +39,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         result.map(|()| false).map_err(|_| error)
     }
 
-    /// Moves states and controls of the iterate into their bounds.
+    /// Projects states and controls of the iterate onto their bounds.
     pub(in crate::ocp) fn clip_to_bounds(&mut self) {
         let Self { qp, iterate, .. } = self;
         for (k, stage) in qp.view().stages().enumerate() {

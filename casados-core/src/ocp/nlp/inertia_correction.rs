@@ -1,30 +1,29 @@
-//! Inertia correction: a multiple of the identity is added to the Hessian of a QP that is not
-//! convex in the directions that its dynamics and bounds leave (A. Wächter, L. T. Biegler, Math.
-//! Program. 106, 2006, section 3.1).
+//! Inertia correction: a multiple of the identity is added to a Hessian whose reduced Hessian is
+//! not positive definite (A. Wächter, L. T. Biegler, Math. Program. 106, 2006, section 3.1).
 
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::qp::{QpError, StageDims};
 use crate::scalar::Real;
 
-/// The first regularisation that is tried, and the smallest one.
+/// The first and the smallest regularisation `δ`.
 const FIRST_DELTA: f64 = 1e-6;
 const MIN_DELTA: f64 = 1e-8;
-/// The largest one.
+/// The largest regularisation `δ`.
 const MAX_DELTA: f64 = 1e10;
-/// What it grows by where it is not enough, and shrinks by from one iteration to the next.
+/// The factor by which `δ` grows within an iteration, and decreases between iterations.
 const DELTA_FACTOR: f64 = 4.0;
-/// It grows so many times because a QP was not solved for a reason that is not known.
+/// The maximum number of increases of `δ` after QPs that failed for an unknown reason.
 const MAX_UNSOLVED_QPS: usize = 1;
 
-/// The regularisation of the last QP that needed one, and less after those that did not.
+/// The regularisation of the last QP that required one, decreased after each QP that required none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp) struct InertiaCorrection {
     last_delta: f64,
 }
 
 impl InertiaCorrection {
-    /// What is tried after `delta`.
+    /// Returns the regularisation to try after `delta`.
     fn next_delta(&mut self, delta: f64) -> f64 {
         let next_delta = if delta > 0.0 {
             DELTA_FACTOR * delta
@@ -39,11 +38,10 @@ impl InertiaCorrection {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Solves the QP at the iterate with as much regularisation `delta`, beside what it has, as it
-    /// takes.
+    /// Solves the QP at the iterate, and adds `delta` to its Hessian as required.
     ///
     /// # Errors
-    /// Those of `solve`.
+    /// The errors of `solve`.
     pub(in crate::ocp) fn correct_inertia(
         &mut self,
         correction: &mut InertiaCorrection,

@@ -1,5 +1,5 @@
 //! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), their
-//! loop (`solver`), and what both of them use.
+//! loop (`solver_loop`), and shared parts.
 
 pub(in crate::ocp) mod bound_consistency;
 mod degenerate_start;

@@ -1,4 +1,4 @@
-//! Solutions from several guesses.
+//! Multi-start: solutions from several guesses.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
@@ -9,8 +9,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::cmp::Ordering;
 
-/// The outcomes of all starts, the best one first; see
-/// [`Ocp::multi_start`](crate::ocp::Ocp::multi_start).
+/// The outcomes of all starts, best first; see [`Ocp::multi_start`](crate::ocp::Ocp::multi_start).
 ///
 /// ```
 /// # use casados::ocp::{GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Problem};
@@ -43,11 +42,11 @@ use core::cmp::Ordering;
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct MultiStart<T> {
-    /// Solutions by their objectives, then points that are none by their residuals, then errors.
+    /// Solutions by objective, then other points by residual, then errors.
     pub ranked: Vec<StartOutcome<T>>,
 }
 
-/// What came of one start.
+/// The outcome of one start.
 ///
 /// ```
 /// # use casados::ocp::{GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Problem};
@@ -84,11 +83,11 @@ pub struct MultiStart<T> {
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct StartOutcome<T> {
-    /// Which start.
+    /// The index of the start.
     pub start: usize,
-    /// How its run ended.
+    /// The outcome of its run.
     pub outcome: Result<Outcome, OcpError>,
-    /// The point at its end, to be written to [`Ocp::iterate_mut`](crate::ocp::Ocp::iterate_mut).
+    /// The last point of the run, for [`Ocp::iterate_mut`](crate::ocp::Ocp::iterate_mut).
     pub solution: HeapSolution<T>,
 }
 
@@ -102,7 +101,7 @@ impl<T> MultiStart<T> {
 }
 
 impl<T> StartOutcome<T> {
-    /// What starts are ranked by: the kind, then a number of which less is better.
+    /// The rank of a start: its kind, then a number to be minimised.
     fn rank(&self) -> (u8, f64) {
         match &self.outcome {
             Ok(outcome) if outcome.is_solved() => (0, outcome.objective),
@@ -119,12 +118,12 @@ impl<T> StartOutcome<T> {
 impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
     /// Solves the problem from each of `starts` guesses, and makes the best solution the iterate.
     ///
-    /// `guess` writes the guess of a start; `solver` makes a solver, one for each thread: with the
-    /// feature `parallel` starts are shared among threads, with the same outcomes. Solutions are
-    /// local ones: that the best of many starts is the global one nobody proves.
+    /// `guess` writes the guess of a start. `solver` creates a solver, one for each thread: with
+    /// the feature `parallel` threads share the starts, with the same outcomes. Solutions are local
+    /// minima; the best one need not be the global minimum.
     ///
     /// # Errors
-    /// Those of `solver`, and [`OcpError::OutOfMemory`]. Errors of a start are its outcome.
+    /// The errors of `solver`, and [`OcpError::OutOfMemory`]. Errors of a start are its outcome.
     ///
     /// # Example
     /// ```
@@ -183,7 +182,7 @@ impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
     }
 }
 
-/// All shares of the threads that there are.
+/// Runs the shares of all threads.
 #[cfg(feature = "parallel")]
 fn run_on_threads<R: Send>(
     starts: usize,
@@ -195,7 +194,7 @@ fn run_on_threads<R: Send>(
     Ok(shares.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
-/// The share of the only thread.
+/// Runs all starts on the only thread.
 #[cfg(not(feature = "parallel"))]
 fn run_on_threads<R>(
     _starts: usize,

@@ -1,4 +1,4 @@
-//! What solves problems, whatever the method.
+//! The trait of solvers.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
@@ -10,8 +10,8 @@ use crate::ocp::solution::outcome::Outcome;
 use crate::qp::QpSolver;
 use crate::scalar::Real;
 
-/// A solver of optimal control problems: [`HeapSqp`] and [`HeapIpm`] are. One of one's own is, for
-/// example, a method after another.
+/// A solver of optimal control problems: [`HeapSqp`], [`HeapIpm`], or a user's own, for example one
+/// method as the fallback of another.
 ///
 /// ```
 /// use casados::ocp::*;
@@ -42,10 +42,10 @@ use crate::scalar::Real;
 /// # Ok::<(), OcpError>(())
 /// ```
 pub trait OcpSolver<P, T: Real>: Clone + Send {
-    /// Solves a problem; its iterate is the guess, and the solution afterwards.
+    /// Solves a problem. Its iterate is the guess before, and the solution afterwards.
     ///
     /// # Errors
-    /// Those of [`Sqp::solve`](crate::ocp::Sqp::solve), or of a solver of one's own.
+    /// The errors of [`Sqp::solve`](crate::ocp::Sqp::solve), or of the user's solver.
     fn solve(&mut self, ocp: &mut HeapOcp<P, T>) -> Result<Outcome, OcpError>;
 }
 

@@ -1,4 +1,4 @@
-//! States that follow from the controls of a point.
+//! Simulation of the states with the controls of a point.
 
 use crate::integrator::Integrator;
 use crate::model::Dae;
@@ -11,36 +11,38 @@ use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::degenerate_start::PerturbedVariables;
-use crate::qp::{Places, Solution, StageDims, copy_common, padded_len, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// A run begins again at a simulation that violates less than this part of what its iterate does.
+/// A run restarts from a simulation that violates less than this fraction of the iterate's
+/// violation.
 pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
-/// A simulation that violates more than this multiple of it has gone astray.
+/// The largest ratio of violations of a simulation and of the reference point; larger ones are
+/// useless as a start.
 pub(in crate::ocp) const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
-/// Violations that are no smaller than that, beside those of a simulation with the controls of the
-/// guess, are those of the guess.
+/// If a simulation with the controls of the guess violates at most this multiple of the iterate,
+/// the violations have not decreased since the guess.
 pub(in crate::ocp) const GUESS_VIOLATION_RATIO: f64 = 1.1;
 
-/// Where a second run begins.
+/// The start of a second run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::ocp) enum RestartPoint {
-    /// At a simulation with the controls of the guess.
+    /// A simulation with the controls of the guess.
     Simulation,
-    /// At one with controls beside them: where violations are stationary, but not smallest, at what
-    /// follows from the guess.
+    /// A simulation with perturbed controls, if the violations of the simulated guess are
+    /// stationary but not minimal.
     PerturbedSimulation,
 }
-/// It asks for one after so many steps in a row that lead nowhere.
+/// The number of consecutive stalled steps after which a run tries to restart.
 pub(in crate::ocp) const RESTART_AFTER: usize = 16;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes a guess the iterate, moved into its bounds, with the states that follow from its
-    /// controls, or from controls beside them; what was the iterate is in `guess` then. Whether
-    /// these have values: otherwise the iterate stays.
+    /// Projects a guess onto its bounds, simulates its states, with perturbed controls if `start`
+    /// requires it, and makes it the iterate; `guess` becomes the last iterate. Returns whether the
+    /// simulation is finite; otherwise the iterate is unchanged.
     pub(in crate::ocp) fn simulate_guess(
         &mut self,
         guess: &mut Solution<T, D, M>,
@@ -62,9 +64,9 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         has_values
     }
 
-    /// Moves the states of a point to the ends of the intervals before them, until all gaps are
-    /// closed. Whether that has values, and ends no farther away than `far` times the gaps that
-    /// there were, in `units` if there are any.
+    /// Closes the gaps of a point: moves its states to the ends of the preceding intervals,
+    /// repeatedly. Returns whether all values are finite and the states move by at most
+    /// `max_displacement_ratio` times the initial gaps, in `units` if there are any.
     pub(in crate::ocp) fn close_gaps_by_simulation(
         &mut self,
         point: &mut Solution<T, D, M>,
@@ -80,7 +82,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             }
             let mut sweep_displacement = 0.0;
             let (v, mut remaining_ends) = (point.view_mut().v, &*ends);
-            for place in Places::<T>::new(self.qp().dims).skip(1) {
+            for place in StageOffsetsIter::<T>::new(self.qp().dims).skip(1) {
                 let (ends, next) = remaining_ends.split_at_checked(place.nx).unwrap_or_default();
                 remaining_ends = next;
                 for (i, (x, &end)) in part_mut(v, place.v, place.nx).iter_mut().zip(ends).enumerate() {
@@ -105,17 +107,17 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes the states of the guess those that follow from its controls, and from the initial
-    /// state where that is fixed, from the first state of the guess elsewhere: a guess without
-    /// gaps. First state and controls are moved into their bounds before; states and parameters of
-    /// later stages need no guess. There are no multipliers afterwards.
+    /// Simulates the states of the guess with its controls: from the initial state if that is
+    /// fixed, otherwise from the first state of the guess. The guess has no gaps then. First state
+    /// and controls are projected onto their bounds before; states and parameters of later stages
+    /// need no guess. All multipliers are set to zero.
     ///
     /// The integrator is that of the problem;
-    /// [`guess_by_simulation_with`](Ocp::guess_by_simulation_with) takes another one.
+    /// [`guess_by_simulation_with`](Ocp::guess_by_simulation_with) uses another one.
     ///
     /// # Errors
-    /// [`OcpError::Simulation`] where the simulation ends before the horizon: states up to that
-    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those
+    /// [`OcpError::Simulation`] if the simulation ends before the horizon; states up to that stage
+    /// are those of the simulation then. [`OcpError::NoIntegrator`] for `Collocation`. The errors
     /// of [`Ocp::check`].
     ///
     /// # Example
@@ -141,7 +143,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn guess_by_simulation(&mut self) -> Result<&mut Self, OcpError> {
-        if P::LIFTED {
+        if P::Dynamics::LIFTED {
             return Err(OcpError::NoIntegrator);
         }
         self.roll_out(|ocp, k, end| {
@@ -150,7 +152,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (v, _) = ocp.iterate.variables_and_costates();
             let (ld, np) =
                 (padded_len::<T>(stage_variable_count::<P::Shape>(layout.free_count)), P::Shape::NP);
-            // Of two intervals, since the last one of a horizon may end with a map.
+            // Data of two intervals, since the last interval of a horizon may end with a map.
             let times = data.times.get(k..(k + 3).min(intervals + 1)).unwrap_or_default();
             let (v, p) = (v.get(k * ld..).unwrap_or_default(), data.p.get(k * np..).unwrap_or_default());
             let mut has_end = false;
@@ -166,11 +168,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// As [`Ocp::guess_by_simulation`], by an integrator of the same model, such as an adaptive one
-    /// that takes as many steps as the guess needs.
+    /// [`Ocp::guess_by_simulation`] by another integrator of the same model, such as an adaptive
+    /// one with as many steps as required.
     ///
     /// # Errors
-    /// As [`Ocp::guess_by_simulation`].
+    /// The errors of [`Ocp::guess_by_simulation`].
     ///
     /// # Example
     /// ```
@@ -206,7 +208,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// The states of the iterate, one interval after the other, whose ends `integrate` writes.
+    /// Computes the states of the iterate interval by interval; `integrate` writes the end of an
+    /// interval.
     fn roll_out(
         &mut self,
         mut integrate: impl FnMut(&mut Self, usize, &mut [T]) -> Result<(), OcpError>,
@@ -229,7 +232,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The error of an interval, with the largest state at its start.
+    /// The error of an interval, with the name of the largest state at its start.
     fn simulation_error(&self, interval: usize, error: OcpError) -> OcpError {
         let OcpError::Integration { error, .. } = error else { return error };
         let x = self.iterate.stage(interval).map_or(&[][..], |stage| stage.x);

@@ -1,8 +1,8 @@
 //! The loop of both solvers: evaluate, test, step, restart, log.
 //!
-//! [`Method`] is what a solver does in each of them: [`Sqp`](crate::ocp::Sqp) steps towards the
-//! solution of a quadratic program, [`Ipm`](crate::ocp::Ipm) along Newton's direction of a barrier
-//! problem.
+//! [`IterativeMethod`] has the parts that differ: [`Sqp`](crate::ocp::Sqp) steps towards the
+//! solution of a quadratic program, [`Ipm`](crate::ocp::Ipm) along the Newton direction of a
+//! barrier problem.
 
 use super::stopwatch::Stopwatch;
 use crate::ocp::formulation::error::OcpError;
@@ -15,25 +15,25 @@ use crate::qp::try_reserve;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-/// What follows the test of an iterate.
+/// The next action after the convergence test of an iterate.
 pub(super) enum NextAction {
-    /// A step.
+    /// Take a step.
     Step,
-    /// Another evaluation: what is minimised has changed.
+    /// Evaluate again: the objective or the bounds have changed.
     Reevaluate,
-    /// The end of the run.
+    /// End the run.
     Terminate(Status),
 }
 
 /// The parts of an iteration.
 pub(super) trait IterativeMethod<P, T, D, M> {
-    /// What a run remembers from one iteration to the next.
+    /// State of a run, kept between iterations.
     type RunState<'c>;
 
-    /// Evaluates functions and derivatives at the iterate, and residuals.
+    /// Evaluates functions, derivatives and residuals at the iterate.
     ///
     /// # Errors
-    /// Those of functions and integrators.
+    /// The errors of functions and integrators.
     fn evaluate(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -41,7 +41,7 @@ pub(super) trait IterativeMethod<P, T, D, M> {
         log_row: &mut Iteration,
     ) -> Result<(), OcpError>;
 
-    /// Whether the run ends at the iterate.
+    /// Tests whether the run ends at the iterate.
     fn check_termination(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -49,10 +49,10 @@ pub(super) trait IterativeMethod<P, T, D, M> {
         log_row: &Iteration,
     ) -> NextAction;
 
-    /// A direction, and a step along it; a status if the run ends without.
+    /// Computes a direction and takes a step along it. Returns a status if the run ends instead.
     ///
     /// # Errors
-    /// Those of functions and integrators.
+    /// The errors of functions and integrators.
     fn step(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -61,7 +61,7 @@ pub(super) trait IterativeMethod<P, T, D, M> {
         watch: &mut Stopwatch,
     ) -> Result<Option<Status>, OcpError>;
 
-    /// Whether the run begins again, at another start, where it would end otherwise, or stalls.
+    /// Restarts a run that would end, or stalls, from another point. Returns whether it restarts.
     fn restart(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -75,10 +75,11 @@ pub(super) trait IterativeMethod<P, T, D, M> {
     fn log(&mut self) -> &mut Vec<Iteration>;
 }
 
-/// Iterates until a test, a step or the observer ends the run; counts in `outcome` what it took.
+/// Iterates until a test, a step or the observer ends the run. Counts iterations and times in
+/// `outcome`.
 ///
 /// # Errors
-/// Those of the method.
+/// The errors of the method.
 pub(super) fn iterate<P, T, D, M, S: IterativeMethod<P, T, D, M>>(
     method: &mut S,
     ocp: &mut Ocp<P, T, D, M>,

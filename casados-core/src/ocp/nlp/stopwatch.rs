@@ -1,12 +1,12 @@
-//! How long the parts of an iteration take.
+//! Timing of the parts of an iteration.
 
-/// Time since it was last asked; none passes where there is no clock.
+/// A stopwatch; without a clock all times are zero.
 pub(in crate::ocp) struct Stopwatch {
     #[cfg(feature = "std")]
     last_lap: Option<std::time::Instant>,
 }
 
-/// In a browser the standard library has no clock, and panics when it is asked for the time.
+/// In a browser the standard library has no clock, and panics.
 #[cfg(feature = "std")]
 fn current_time() -> Option<std::time::Instant> {
     (!cfg!(all(target_family = "wasm", target_os = "unknown"))).then(std::time::Instant::now)
@@ -19,7 +19,7 @@ impl Stopwatch {
             last_lap: current_time(),
         }
     }
-    /// Seconds.
+    /// The seconds since the last call, or since the start.
     pub fn lap(&mut self) -> f64 {
         #[cfg(feature = "std")]
         if let (Some(now), Some(last)) = (current_time(), self.last_lap) {

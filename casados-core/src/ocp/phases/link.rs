@@ -1,4 +1,4 @@
-//! What connects the end of a phase with the start of the next one.
+//! Links: the map from the end of a phase to the start of the next.
 
 use crate::function::{ArrayV, Function};
 use crate::ocp::formulation::error::OcpError;
@@ -20,30 +20,29 @@ use core::fmt;
 pub struct PhaseEnd<'a, T> {
     pub(in crate::ocp) stage: usize,
     pub(in crate::ocp) x: &'a [T],
-    /// Free parameters, and where they are among those of the model.
+    /// Free parameters, and their positions among the parameters of the model.
     pub(in crate::ocp) w: &'a [T],
     pub(in crate::ocp) free: FreeParametersView<'a>,
-    /// The parameters that were set.
+    /// The set parameters.
     pub(in crate::ocp) p: &'a [T],
     pub(in crate::ocp) t: T,
 }
 
-/// What a link is to fit.
+/// The dimensions that a link must match.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseDims {
-    /// `NX`, `NU`, `NP`, `NZ` of the phase that ends.
+    /// `NX`, `NU`, `NP`, `NZ` of the phase before the link.
     pub(in crate::ocp) ending_dims: [usize; 4],
-    /// States of the phase that ends, and of the one that begins, without linear controls and
-    /// integrals.
+    /// States of the phases before and after the link, without linear controls and integrals.
     pub(in crate::ocp) model_states: usize,
     pub(in crate::ocp) next_states: usize,
-    /// The last stage of the phase that ends, and whether its time is known there.
+    /// The last stage of the phase before the link, and whether its time is fixed.
     pub(in crate::ocp) stage: usize,
     pub(in crate::ocp) is_timed: bool,
 }
 
-/// What connects the end of a phase with the start of the next one: [`Jump`], or [`Continuous`].
+/// The map from the end of a phase to the start of the next: [`Jump`], or [`Continuous`].
 ///
 /// ```
 /// use casados::ocp::{Continuous, Link};
@@ -52,18 +51,20 @@ pub struct PhaseDims {
 /// assert!(is_named(&Continuous, "Continuous"));
 /// ```
 pub trait Link<T: Real> {
-    /// What it is called in messages.
+    /// Returns its name for messages.
     fn name(&self) -> &'static str;
-    /// Whether it is linear.
+    /// Returns whether it is linear.
     #[doc(hidden)]
     fn is_linear(&self) -> bool;
-    /// Whether it is a function of the one phase with an output for each state of the other.
+    /// Checks that its arguments match the phase before and its outputs the states of the phase
+    /// after.
     #[doc(hidden)]
     fn check(&self, dims: PhaseDims) -> Result<(), OcpError>;
-    /// The first state of the next phase.
+    /// Evaluates the first state of the next phase.
     #[doc(hidden)]
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError>;
-    /// With its derivatives, a column over the variables of the stage for each state.
+    /// Evaluates the first state of the next phase and its derivatives, a column over the variables
+    /// of the stage for each state.
     #[doc(hidden)]
     fn linearise(
         &mut self,
@@ -71,12 +72,12 @@ pub trait Link<T: Real> {
         values: &mut [T],
         columns: (&mut [T], usize),
     ) -> Result<(), OcpError>;
-    /// Adds its second derivatives with these multipliers.
+    /// Adds its second derivatives, weighted by these multipliers.
     #[doc(hidden)]
     fn add_hessian(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut QuadraticTerms<'_, T>);
 }
 
-/// The states go on as they are.
+/// The states are continuous.
 ///
 /// [`Phases`](crate::ocp::Phases) has an example.
 ///
@@ -116,12 +117,12 @@ impl<T: Real> Link<T> for Continuous {
 }
 
 /// The states of the next phase are a function of the states and parameters at the end of a phase:
-/// an impact, what is dropped at a separation, another frame.
+/// an impact, a separation with a loss of mass, a change of the frame.
 ///
-/// The function has the arguments of the model that ends, and depends on no control and no
-/// algebraic state; it has an output for each state of the model that begins. Its derivatives of
-/// first and second order are exact. What is decided at the switch, as an impulse, is a free
-/// parameter of the phase that ends.
+/// The function has the arguments of the model before the link, depends on no control and no
+/// algebraic state, and has an output for each state of the model after it. Its first and second
+/// derivatives are exact. A decision at the switch, as an impulse, is a free parameter of the phase
+/// before.
 ///
 /// [`Phases`](crate::ocp::Phases) has an example.
 ///
@@ -141,7 +142,7 @@ pub struct Jump<F: Function, T: Plain = f64> {
 }
 
 impl<F: Function, T: Real> Jump<F, T> {
-    /// By this function.
+    /// The link by this function.
     #[must_use]
     pub fn new() -> Self {
         let none = T::from_f64(f64::INFINITY);

@@ -1,18 +1,19 @@
-//! Problems of several phases, solved as one.
+//! Problems with several phases, solved as one.
 //!
 //! ```text
 //! start   →   phase 0: x₀ … x_N   →   phase 1: x₀ = link(x_N, p of phase 0) … x_N   →   …
 //! ```
 //!
-//! What is decided where a phase begins, its parameters and what no link says, are controls of the
-//! stage before it: the last one of the phase before, or a stage without states, the start.
+//! Decisions at the start of a phase, its free parameters and the states that no link determines,
+//! are controls of the stage before: the last stage of the previous phase, or the start, a stage
+//! without states.
 //!
 //! | | |
 //! | --- | --- |
-//! | `link` | what connects two phases |
-//! | `phase` | a phase, whatever its problem is |
-//! | `transfer` | points, bounds and QPs go from a phase to the whole and back |
-//! | `program` | what solvers ask |
+//! | `link` | the map from the end of a phase to the start of the next |
+//! | `phase` | a phase, independent of the type of its problem |
+//! | `stage_conversion` | points, bounds and QPs of phases and of the joined problem |
+//! | `program` | the interface to solvers |
 
 mod link;
 mod phase;
@@ -35,34 +36,36 @@ use crate::qp::{
     HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, try_reserve, zeros,
 };
 use crate::scalar::Real;
+use crate::structure::name_matches;
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
-use phase::{Phase, PhaseSize};
+use phase::{Phase, PhaseStart};
 use stage_conversion::StagePosition;
 
-/// Problems that follow one another, solved as one: other models, other horizons, other controls.
+/// A sequence of problems, solved as one, each with its own model, horizon and controls.
 ///
 /// ```text
 /// min  Σ_i (costs of phase i)        x₀ of phase i+1 = link_i(x_N, p of phase i)
 /// ```
 ///
 /// A phase is a problem on a horizon, with bounds, costs, constraints, free parameters and guesses
-/// by its own names. How long it takes is fixed, or found ([`Horizon::free`](crate::ocp::Horizon));
-/// each has its own clock, which begins at its first node. The first one has an initial state, that
-/// of another is what its [`Link`] makes of the end of the one before: [`Continuous`], or a
-/// [`Jump`].
+/// by its own names. Its duration is fixed or free ([`Horizon::free`](crate::ocp::Horizon)); its
+/// time starts at its first node. The first phase has an initial state; the [`Link`] before another
+/// phase maps the end of the previous one to its first state: [`Continuous`], or a [`Jump`].
 ///
-/// `join` makes one problem of them, which [`Sqp`](crate::ocp::Sqp) and [`Ipm`](crate::ocp::Ipm)
-/// solve with exact derivatives, in time that is linear in the number of intervals. It borrows the
-/// phases; after a solver each has its part of the iterate, with multipliers.
+/// `join` makes one problem of the phases, which [`Sqp`](crate::ocp::Sqp) and
+/// [`Ipm`](crate::ocp::Ipm) solve with exact derivatives, in time that is linear in the number of
+/// intervals. It borrows the phases; after a run each phase has its part of the iterate, with
+/// multipliers.
 ///
-/// Parameters of a phase are states of the whole, with `w₊ = w`; each phase carries its own alone.
+/// Free parameters of a phase are states of the joined problem, with `w₊ = w`; each phase has only
+/// its own.
 ///
 /// # Example
-/// A ball is thrown up, hits the ground where half of its speed is left, and is to be as high as it
-/// was after as short a time as possible. The speed at the start is bounded.
+/// A ball is thrown up, bounces with half of its speed, and must return to its first height in
+/// minimum time. Its initial speed is bounded.
 /// ```
 /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Jump, Phases, Problem};
 /// use casados::prelude::*;
@@ -97,24 +100,28 @@ use stage_conversion::StagePosition;
 /// ```
 pub struct Phases<'a, T = f64> {
     phases: Vec<JoinedPhase<'a, T>>,
-    /// A point that is tried, as one of each phase; none before they are joined.
+    /// The trial point of each phase; empty before `join`.
     trial_points: Vec<TrialPoint<T>>,
-    /// The first state of all, as far as it is given.
+    /// The fixed elements of the first state.
     initial_state: Vec<T>,
 }
 
-/// A point of a phase, and the ends of its intervals and constraints there.
+/// A trial point of a phase, with the ends of its intervals and its constraints there.
 struct TrialPoint<T> {
     point: HeapSolution<T>,
     ends: Vec<T>,
 }
 
-/// A phase, and what follows it.
+/// A phase and the link after it.
 struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
+    begin: PhaseStart,
+    /// Names of the parameters that are those of the phase before.
+    shares: Vec<&'a str>,
     link: Option<Box<dyn Link<T> + 'a>>,
-    size: PhaseSize,
-    /// The first of its stages among all.
+    /// The start of the next phase.
+    next: Option<PhaseStart>,
+    /// The index of its first stage in the joined problem.
     first: usize,
 }
 
@@ -125,7 +132,7 @@ impl<T> fmt::Debug for Phases<'_, T> {
 }
 
 impl<'a, T: Real> Phases<'a, T> {
-    /// Of the first phase.
+    /// Starts a sequence with its first phase.
     pub fn new<P>(first: &'a mut HeapOcp<P, T>) -> Self
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
@@ -133,7 +140,7 @@ impl<'a, T: Real> Phases<'a, T> {
         Self { phases: vec![JoinedPhase::new(first)], trial_points: Vec::new(), initial_state: Vec::new() }
     }
 
-    /// With another phase, which begins where the link says.
+    /// Appends a phase, which starts by the link.
     #[must_use]
     pub fn then<P>(mut self, link: impl Link<T> + 'a, next: &'a mut HeapOcp<P, T>) -> Self
     where
@@ -146,29 +153,68 @@ impl<'a, T: Real> Phases<'a, T> {
         self
     }
 
-    /// One problem of all phases, whose iterate is the guess of each. Its stages are the start and
-    /// those of the phases, one after the other.
+    /// Shares a free parameter, by name, between the last phase and the phase before: one value is
+    /// found for both.
     ///
-    /// What is set in a phase afterwards takes another `join`.
+    /// # Example
+    /// A car is pushed and braked for a second each; its final speed determines its mass.
+    /// ```
+    /// use casados::ocp::{Continuous, HeapIpm, Horizon, Phases, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// /// Speed and mass; 2 N, then −1 N.
+    /// #[ode]
+    /// fn push(_x: f64, p: f64) -> f64 { 2.0 / p }
+    /// #[ode]
+    /// fn brake(_x: f64, p: f64) -> f64 { -1.0 / p }
+    ///
+    /// let mut first = Problem::new(Irk::<Push, Gauss<1>>::new(Options::default())?)
+    ///     .on(Horizon::uniform(2, 0.5))?;
+    /// first.fix_initial_state(&[0.0])?.guess(&[1.0], &[])?.free("p", 0.1..=9.0, 1.0)?;
+    /// let mut second = Problem::new(Irk::<Brake, Gauss<1>>::new(Options::default())?)
+    ///     .on(Horizon::uniform(2, 0.5))?;
+    /// second.guess(&[1.0], &[])?.bound("x", 2.., 2.0, 2.0)?.free("p", 0.1..=9.0, 1.0)?;
+    ///
+    /// let mut drive = Phases::new(&mut first).then(Continuous, &mut second).share("p").join()?;
+    /// assert!(HeapIpm::new(&drive)?.solve(&mut drive)?.is_converged());
+    /// drop(drive);
+    /// let mass = second.solution()?.parameter("p")?[0];
+    /// assert!((mass - 0.5).abs() < 1e-7);
+    /// assert_eq!(first.solution()?.parameter("p")?[0], mass);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn share(mut self, name: &'a str) -> Self {
+        if let Some(last) = self.phases.last_mut() {
+            last.shares.push(name);
+        }
+        self
+    }
+
+    /// Joins the phases to one problem, whose iterate consists of their guesses. Its stages are the
+    /// start and the stages of all phases in order.
+    ///
+    /// Later changes of a phase require another `join`.
     ///
     /// # Errors
     /// [`OcpError::LinkDimension`], [`OcpError::NotThere`], [`OcpError::DependsOnTime`] of a link;
-    /// [`OcpError::Phase`] of an initial state behind the first phase, of collocation, periodic
-    /// states and shared controls; [`OcpError::Missing`] and others of a phase that is not complete
-    /// ([`Ocp::check`]); [`OcpError::OutOfMemory`].
+    /// [`OcpError::Phase`] for a fixed initial state after the first phase, for periodic states,
+    /// shared controls, and shared parameters that are not free in both phases;
+    /// [`OcpError::Missing`] and other errors of an incomplete phase ([`Ocp::check`]);
+    /// [`OcpError::OutOfMemory`].
     pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
-        let mut start_variables: Vec<usize> =
-            self.phases.iter().map(|phase| phase.size.start_variable_count()).collect();
-        start_variables.push(0);
-        let mut decided = start_variables.into_iter();
+        let mut decided: Vec<usize> =
+            self.phases.iter().map(|phase| phase.begin.start_variable_count()).collect();
+        decided.push(0);
+        let mut decided = decided.into_iter();
         dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
         for (phase, decided) in self.phases.iter_mut().zip(decided) {
             phase.first = dims.len();
             let phase_dims = phase.problem.qp().dims();
             try_reserve(&mut dims, phase_dims.len())?;
-            let (nx, free) = (phase.size.nx, phase.size.free);
+            let (nx, free) = (phase.begin.size.nx, phase.begin.size.free);
             dims.extend(phase_dims.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
                 last.nu = decided;
@@ -199,58 +245,59 @@ impl<'a, T: Real> Phases<'a, T> {
     }
 
     /// # Errors
-    /// Those of [`Phases::join`].
+    /// The errors of [`Phases::join`].
     fn check(&mut self) -> Result<(), OcpError> {
         for (index, phase) in self.phases.iter_mut().enumerate() {
             if let Some(what) = phase.problem.unsupported_feature(index == 0) {
                 return Err(OcpError::Phase { phase: index, model: phase.problem.names().model, what });
             }
-            phase.problem.check()?;
-            phase.size = phase.problem.size();
-            phase.size.given_states =
-                if index == 0 { phase.size.given_states } else { phase.size.model_states };
+            phase.problem.check().map_err(|error| error.in_phase(index))?;
+            let mut size = phase.problem.size();
+            size.given_states = if index == 0 { size.given_states } else { size.model_states };
+            phase.begin = PhaseStart { size, shared: vec![None; size.free] };
         }
         self.initial_state = self.given_initial_state()?;
-        for (phase, next) in self.phases.iter().zip(self.phases.iter().skip(1)) {
-            if let Some(link) = &phase.link {
-                link.check(phase.problem.link_dims(next.size.model_states))?;
+        let mut before: Option<&mut JoinedPhase<'_, T>> = None;
+        for (index, phase) in self.phases.iter_mut().enumerate() {
+            phase.share_parameters(before.as_deref(), index)?;
+            if let Some(before) = &mut before {
+                if let Some(link) = &before.link {
+                    link.check(before.problem.link_dims(phase.begin.size.model_states))?;
+                }
+                before.next = Some(phase.begin.clone());
             }
+            before = Some(phase);
         }
         Ok(())
     }
 
-    /// The first state of all, as far as it is given.
+    /// Returns the fixed elements of the first state.
     fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
-        let Some(JoinedPhase { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
-        let mut start = zeros(size.given_states)?;
+        let Some(JoinedPhase { problem, begin, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let mut start = zeros(begin.size.given_states)?;
         if let Some(first) = problem.qp().stage(0) {
             copy_common(&mut start, first.x_bounds().lower);
         }
         Ok(start)
     }
 
-    /// How large the phase behind each one is.
-    fn next_sizes(&self) -> Vec<Option<PhaseSize>> {
-        self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
-    }
-
-    /// The phase of a stage of the whole; none of the start.
+    /// Returns the phase of a stage of the joined problem; none for the start.
     fn at(&self, stage: usize) -> Option<(usize, &JoinedPhase<'a, T>)> {
         self.phases.iter().enumerate().rev().find(|(_, phase)| phase.first <= stage)
     }
 
-    /// Bounds of all stages, and those of constraints as they were given: the lower ones, then the
-    /// upper ones.
+    /// Writes the bounds of all stages, and the bounds of constraints as the user gave them: lower
+    /// bounds, then upper bounds.
     fn write_bounds(&mut self, qp: &mut Qp<T, Vec<StageDims>, Vec<T>>, given: &mut [T]) {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
         let mut previous_stage = stages.next();
-        for (index, JoinedPhase { problem, size, .. }) in self.phases.iter_mut().enumerate() {
+        for (index, JoinedPhase { problem, begin, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
                 if k == 0
                     && let Some(mut previous) = previous_stage.take()
                 {
-                    stage_conversion::write_start_variable_bounds(*size, &from, &mut previous);
+                    stage_conversion::write_start_variable_bounds(begin, &from, &mut previous);
                 }
                 let Some(mut to) = stages.next() else { return };
                 let position = match (index, k) {
@@ -258,7 +305,7 @@ impl<'a, T: Real> Phases<'a, T> {
                     (_, 0) => StagePosition::PhaseStart,
                     _ => StagePosition::InteriorStage,
                 };
-                stage_conversion::copy_stage_bounds(*size, &from, &mut to, position);
+                stage_conversion::copy_stage_bounds(begin, &from, &mut to, position);
                 previous_stage = Some(to);
             }
             for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given_constraint_bounds()) {
@@ -269,32 +316,32 @@ impl<'a, T: Real> Phases<'a, T> {
         }
     }
 
-    /// The iterates of all phases as that of the whole.
+    /// Writes the iterates of all phases to the iterate of the joined problem.
     fn store_iterates(&self, to: &mut HeapSolution<T>) {
         let first_stages =
-            || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
+            || self.phases.iter().map(|phase| (&phase.begin, phase.problem.iterate().stages().next()));
         let nexts = first_stages().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
-            let next = next.and_then(|(size, first)| Some((size, first?)));
-            let last = phase.size.intervals;
+            let next = next.and_then(|(begin, first)| Some((begin, first?)));
+            let size = phase.begin.size;
             let stages = phase.problem.iterate().stages().enumerate();
-            stages.map(move |(k, stage)| (phase.size, stage, next.filter(|_| k == last)))
+            stages.map(move |(k, stage)| (size, stage, next.filter(|_| k == size.intervals)))
         });
-        let mut start = first_stages().next().and_then(|(size, first)| Some((size, first?)));
+        let mut start = first_stages().next().and_then(|(begin, first)| Some((begin, first?)));
         to.each_stage_mut(|to| {
-            if let Some((size, first)) = start.take() {
-                stage_conversion::write_start_variables(size, &first, to.u, to.u_lower, to.u_upper);
+            if let Some((begin, first)) = start.take() {
+                stage_conversion::write_start_variables(begin, &first, to.u, to.u_lower, to.u_upper);
             } else if let Some((size, from, next)) = stages.next() {
                 stage_conversion::store_phase_stage(size, &from, to, next);
             }
         });
     }
 
-    /// The part of each phase in a point of the whole, as its iterate.
+    /// Reads a point of the joined problem to the iterates of the phases.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
-        for JoinedPhase { problem, size, .. } in &mut self.phases {
-            before = stage_conversion::load_phase(*size, &mut stages, problem.iterate_mut(), before);
+        for JoinedPhase { problem, begin, .. } in &mut self.phases {
+            before = stage_conversion::load_phase(begin, &mut stages, problem.iterate_mut(), before);
         }
     }
 }
@@ -304,12 +351,43 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
     {
-        let size = Phase::<T>::size(problem);
-        Self { problem, link: None, size, first: 0 }
+        let begin = PhaseStart { size: Phase::<T>::size(problem), shared: Vec::new() };
+        Self { problem, begin, shares: Vec::new(), link: None, next: None, first: 0 }
+    }
+
+    /// Which of its free parameters are those of the phase before.
+    ///
+    /// # Errors
+    /// [`OcpError::Phase`]
+    fn share_parameters(&mut self, before: Option<&Self>, phase: usize) -> Result<(), OcpError> {
+        let names = self.problem.names();
+        for name in &self.shares {
+            let mut is_found = false;
+            let meant = names.p.iter().enumerate().filter(|(_, label)| name_matches(name, label));
+            for (parameter, label) in meant {
+                let own = self.problem.free_index(parameter);
+                let other = before.and_then(|before| {
+                    let of_before = before.problem.names().p;
+                    before.problem.free_index(of_before.iter().position(|other| other == label)?)
+                });
+                if let (Some(own), Some(other)) = (own, other)
+                    && let Some(shared) = self.begin.shared.get_mut(own)
+                {
+                    (*shared, is_found) = (Some(other), true);
+                }
+            }
+            if !is_found {
+                let what =
+                    "a shared parameter that is not free in it and in the phase before: `free` of both";
+                return Err(OcpError::Phase { phase, model: names.model, what });
+            }
+        }
+        Ok(())
     }
 }
 
-/// Room for two matrices and a vector over the variables of a stage, or for four vectors.
+/// Returns the length of two matrices and a vector over the variables of a stage, or of four
+/// vectors.
 fn scratch_len<T>(dims: &[StageDims]) -> usize {
     let of_stage = |stage: &StageDims| {
         let n = stage.nx + stage.nu;

@@ -1,8 +1,8 @@
-//! A phase, whatever its problem is.
+//! The interface of a phase, independent of the type of its problem.
 
 use super::link::{PhaseDims, PhaseEnd};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
-use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
@@ -14,16 +14,17 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 use crate::shape::Shape;
+use alloc::vec::Vec;
 use core::ops::Range;
 
-/// The Hessian that a solver takes.
+/// The kind of Hessian.
 #[derive(Clone, Copy)]
 pub(super) struct Kind {
     pub exact: bool,
     pub convexification: Convexification,
 }
 
-/// How large a phase is.
+/// The dimensions of a phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PhaseSize {
     /// States.
@@ -34,49 +35,77 @@ pub(super) struct PhaseSize {
     pub model_states: usize,
     /// Linear controls.
     pub linear_controls: usize,
-    /// States whose start the link says; those up to `own + linear` behind them are decided.
+    /// States that the link gives; the states from here to `model_states + linear_controls` are
+    /// decided.
     pub given_states: usize,
     pub intervals: usize,
 }
 
 impl PhaseSize {
-    /// The states that are decided where the phase begins.
+    /// Returns the states that are decided at the start of the phase.
     pub fn free_start_states(&self) -> Range<usize> {
         self.given_states..self.model_states + self.linear_controls
     }
+}
 
-    /// How much is decided there: these states, then the parameters.
+/// The start of a phase: its free states are decided there, then the parameters that it does not
+/// share with the phase before.
+#[derive(Clone, Debug)]
+pub(super) struct PhaseStart {
+    pub size: PhaseSize,
+    /// For each free parameter the index of the shared parameter of the phase before.
+    pub shared: Vec<Option<usize>>,
+}
+
+impl PhaseStart {
+    /// Returns the indices of the parameters that are decided there.
+    pub fn parameters(&self) -> impl Iterator<Item = usize> {
+        self.shared.iter().enumerate().filter(|(_, shared)| shared.is_none()).map(|(w, _)| w)
+    }
+
+    /// Returns the number of variables that are decided there: states, then parameters.
     pub fn start_variable_count(&self) -> usize {
-        self.free_start_states().len() + self.free
+        self.size.free_start_states().len() + self.parameters().count()
     }
 }
 
-/// A phase, whatever its problem is.
+/// A phase, independent of the type of its problem.
 pub(super) trait Phase<T: Real> {
     fn size(&self) -> PhaseSize;
     fn names(&self) -> Names;
-    /// What a link at its end is to fit that leads to so many states.
+    /// Returns the index of a parameter of the model among the free parameters.
+    fn free_index(&self, parameter: usize) -> Option<usize>;
+    /// Returns the dimensions that a link at its end must match; `begins` is the number of states
+    /// of the next phase.
     fn link_dims(&self, begins: usize) -> PhaseDims;
-    /// What a phase cannot be, of the first one or of another; then its start is free.
+    /// Returns a feature that phases do not support. Frees the start of every phase but the first.
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
     fn qp(&self) -> QpView<'_, T>;
     fn iterate(&self) -> &HeapSolution<T>;
     fn iterate_mut(&mut self) -> &mut HeapSolution<T>;
-    /// Bounds of constraints as they were given.
+    /// Returns the bounds of constraints as the user gave them.
     fn given_constraint_bounds(&mut self) -> [&[T]; 2];
-    /// Writes the QP at the iterate; the objective.
+    /// Writes the QP at the iterate, and returns the objective.
     fn linearise(&mut self, kind: Kind) -> Result<T, OcpError>;
     fn evaluate(&mut self, trial_point: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
-    /// The end at this point of the last stage.
+    /// Whether the stages of its intervals are variables.
+    fn is_lifted(&self) -> bool;
+    /// Sets the step length of lifted stages for the next evaluation; returns the sum and the
+    /// largest of the residuals of their equations.
+    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2];
+    fn initialise_stages(&mut self) -> Result<(), OcpError>;
+    fn expand_stage_steps(&mut self, step: &HeapSolution<T>) -> Result<(), OcpError>;
+    fn apply_stage_action(&mut self, action: StageAction<T>);
+    /// Returns the end of the phase, at this point of its last stage.
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
     fn derivative(&self, error: &QpError) -> Option<OcpError>;
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>);
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>);
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// The first state of the iterate, as far as it is given.
+    /// Writes the fixed initial state to the iterate.
     fn set_given_initial_state(&mut self) {
         let model_states = self.names().model_state_count();
         let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
@@ -105,6 +134,9 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn names(&self) -> Names {
         <P::Dynamics as Dynamics<T>>::NAMES
     }
+    fn free_index(&self, parameter: usize) -> Option<usize> {
+        self.free.view().index_of(parameter)
+    }
     fn link_dims(&self, begins: usize) -> PhaseDims {
         PhaseDims {
             ending_dims: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
@@ -116,9 +148,6 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     }
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str> {
         let free = self.free.count();
-        if P::Dynamics::LIFTED {
-            return Some("collocation, whose stages are variables: take an integrator");
-        }
         if marked_indices(self.qp.view().periodic()).next().is_some() {
             return Some("periodic states: a phase begins where the one before it ends");
         }
@@ -165,6 +194,22 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError> {
         self.evaluate(at, ends)
     }
+    fn is_lifted(&self) -> bool {
+        P::Dynamics::LIFTED
+    }
+    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2] {
+        self.step_length = step_length;
+        self.stage_residuals
+    }
+    fn initialise_stages(&mut self) -> Result<(), OcpError> {
+        <P as Program<T>>::initialise_stages(self)
+    }
+    fn expand_stage_steps(&mut self, step: &HeapSolution<T>) -> Result<(), OcpError> {
+        <P as Program<T>>::expand_stage_steps(self, step)
+    }
+    fn apply_stage_action(&mut self, action: StageAction<T>) {
+        Program::apply_stage_action(&mut self.problem, action);
+    }
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T> {
         let (stage, np, data) = (self.intervals(), P::Shape::NP, self.data.as_slice());
         PhaseEnd {
@@ -182,7 +227,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn derivative(&self, error: &QpError) -> Option<OcpError> {
         self.non_finite_derivative(error)
     }
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>) {
-        self.convexity_and_violation(asks)
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>) {
+        self.convexity_and_violation(needs_violation)
     }
 }

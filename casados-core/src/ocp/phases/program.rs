@@ -1,12 +1,12 @@
-//! What solvers ask of phases: each answers for its stages, and links for what is between them.
+//! The program of joined phases: each phase provides its stages, links the steps between phases.
 
 use super::link::{Link, PhaseEnd};
-use super::phase::{Kind, PhaseSize};
+use super::phase::{Kind, Phase, PhaseSize, PhaseStart};
 use super::{JoinedPhase, Phases, TrialPoint, stage_conversion};
 use crate::linalg::dot;
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
-use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
+use crate::ocp::formulation::functions::dynamics::{Nodes, Sink, StageAction, add_stage_residuals};
 use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::curvature::Convexification;
@@ -17,10 +17,10 @@ use crate::qp::{
     copy_common, part, part_mut, take_mut,
 };
 use crate::scalar::Real;
-use alloc::vec::Vec;
 use core::ops::Range;
 
-/// What the curvature of [`Phases`] is of: of the dynamics of each phase.
+/// The type of dynamics that a [`Curvature`] of [`Phases`] is generic over; each phase linearises
+/// its own.
 ///
 /// No value has this type.
 ///
@@ -59,12 +59,36 @@ curvatures! {
     f32, GaussNewton, false;
 }
 
-/// Of these numbers alone: whoever had numbers of one's own could make a formulation of phases, and
-/// every formulation is a program.
+/// For `f64` and `f32` only: with a generic number this implementation would conflict with that for
+/// every [`Formulation`](crate::ocp::Formulation).
 macro_rules! programs {
     ($($number:ty),*) => {$(
         impl Program<$number> for Phases<'_, $number> {
             type Dynamics = PhaseDynamics;
+
+            fn is_lifted(&self) -> bool {
+                self.phases.iter().any(|phase| phase.problem.is_lifted())
+            }
+
+            fn initialise_stages<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+            ) -> Result<(), OcpError> {
+                ocp.problem.load(ocp.iterate.stages());
+                ocp.problem.each_phase(|phase, _| phase.initialise_stages())
+            }
+
+            fn expand_stage_steps<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+                step: &Solution<$number, D, M>,
+            ) -> Result<(), OcpError> {
+                ocp.problem.load(ocp.iterate.stages());
+                ocp.problem.load_trials(step.stages());
+                ocp.problem.each_phase(|phase, trial| phase.expand_stage_steps(&trial.point))
+            }
+
+            fn apply_stage_action(&mut self, action: StageAction<$number>) {
+                self.phases.iter_mut().for_each(|phase| phase.problem.apply_stage_action(action));
+            }
 
             fn linearise<C, D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
                 ocp: &mut Ocp<Self, $number, D, M>,
@@ -88,7 +112,11 @@ macro_rules! programs {
                 ends: &mut [$number],
             ) -> Result<$number, OcpError> {
                 let length = intervals_end(ocp.qp.dims());
-                ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())
+                ocp.problem.stage_residuals(ocp.step_length);
+                let objective =
+                    ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())?;
+                ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
+                Ok(objective)
             }
 
             fn split<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
@@ -102,7 +130,7 @@ macro_rules! programs {
             }
 
             fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
-                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
+                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.begin.size.intervals + 1);
                 core::iter::once(0..1).chain(phases)
             }
 
@@ -118,13 +146,16 @@ macro_rules! programs {
                 ocp: &Ocp<Self, $number, D, M>,
                 error: &QpError,
             ) -> Option<OcpError> {
-                ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
-                    // What no phase has is of a link.
+                let of_phase = |(index, phase): (usize, &JoinedPhase<'_, $number>)| {
+                    Some(phase.problem.derivative(error)?.in_phase(index))
+                };
+                ocp.problem.phases.iter().enumerate().find_map(of_phase).or_else(|| {
+                    // A non-finite number in no phase belongs to a link.
                     let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
-                    let (_, phase) = ocp.problem.at(stage)?;
+                    let (index, phase) = ocp.problem.at(stage)?;
                     let function = phase.link.as_ref()?.name();
                     let stage = stage - phase.first;
-                    Some(OcpError::NonFiniteFunction { function, stage, output: 0, value })
+                    Some(OcpError::NonFiniteFunction { function, stage, output: 0, value, phase: None }.in_phase(index))
                 })
             }
 
@@ -132,7 +163,8 @@ macro_rules! programs {
                 ocp: &mut Ocp<Self, $number, D, M>,
                 asks: bool,
             ) -> (bool, Option<(ConstraintName, f64)>) {
-                let Ocp { problem, iterate, .. } = ocp;
+                let Ocp { problem, iterate, step_length, .. } = ocp;
+                problem.stage_residuals(*step_length);
                 problem.load(iterate.stages());
                 let (mut is_convex, mut worst) = (true, None);
                 for (index, phase) in problem.phases.iter_mut().enumerate() {
@@ -152,24 +184,27 @@ macro_rules! programs {
 
 programs!(f64, f32);
 
-/// Writes the QP at the iterate, and the objective.
+/// Writes the QP at the iterate, and returns the objective.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
     kind: Kind,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
+    ocp.problem.stage_residuals(ocp.step_length);
     let mut objective = T::ZERO;
-    for phase in &mut ocp.problem.phases {
-        objective = objective + phase.problem.linearise(kind)?;
+    for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
+        objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
     }
     ocp.objective = objective;
+    ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
     let Ocp { problem, qp, iterate, data, .. } = ocp;
     let rows = 2 * qp.dims().iter().map(|stage| stage.ng).sum::<usize>();
     let scratch = data.as_mut().get_mut(rows..).unwrap_or_default();
     problem.write_qp(qp, iterate, scratch, kind)
 }
 
-/// Ends of the intervals of a phase, with its parameters as states that stay, and its constraints.
+/// Writes the ends of the intervals of a phase, with its parameters as constant states, and its
+/// constraints.
 fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
     let PhaseSize { nx, free, intervals, .. } = size;
     let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
@@ -182,37 +217,37 @@ fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [
 }
 
 impl<T: Real> JoinedPhase<'_, T> {
-    /// Where the next phase begins: what the link makes of the end, and what is decided there.
+    /// Writes the start of the next phase: the states by the link, and the decided variables.
     fn write_start(
         &mut self,
-        next: PhaseSize,
         trial: &TrialPoint<T>,
         last_stage: &SolutionStage<'_, T>,
-        start: &mut [T],
+        starts: &mut &mut [T],
     ) -> Result<(), OcpError> {
-        let (Some(link), Some(last)) = (&mut self.link, trial.point.stages().next_back()) else {
-            return Ok(());
-        };
-        link.value(self.problem.phase_end(last), part_mut(start, 0, next.given_states))?;
-        stage_conversion::write_start_state(next, last_stage.u, start);
+        let (Some(next), Some(link)) = (&self.next, &mut self.link) else { return Ok(()) };
+        let start = take_mut(starts, next.size.nx + next.size.free);
+        let Some(last) = trial.point.stages().next_back() else { return Ok(()) };
+        link.value(self.problem.phase_end(last), part_mut(start, 0, next.size.given_states))?;
+        let previous_stage = last_stage.x.get(self.begin.size.nx..).unwrap_or_default();
+        stage_conversion::write_start_state(next, last_stage.u, previous_stage, start);
         Ok(())
     }
 }
 
-/// Where the next phase begins in the QP, at the last stage of a phase and its point `v` with
-/// multipliers `pi`.
+/// Writes the link to the QP at the last stage of a phase, at its point `v` with the multipliers
+/// `pi`.
 fn write_link_to_qp<T: Real>(
     link: &mut dyn Link<T>,
     end: PhaseEnd<'_, T>,
-    [size, next]: [PhaseSize; 2],
+    (size, begin): (PhaseSize, &PhaseStart),
     arrays: &mut Arrays<'_, T>,
     (v, pi): (&[T], &[T]),
     scratch: &mut [T],
     Kind { exact, convexification }: Kind,
 ) -> Result<(), OcpError> {
-    let Arrays { n, ld, next: next_state_count, matrix, hessian, gradient, offset, .. } = arrays;
-    let (n, ld) = (*n, *ld);
-    let columns = part_mut(matrix, 0, *next_state_count * ld);
+    let Arrays { n, ld, next: states, matrix, hessian, gradient, offset, .. } = arrays;
+    let (n, ld, next) = (*n, *ld, begin.size);
+    let columns = part_mut(matrix, 0, *states * ld);
     columns.fill(T::ZERO);
     offset.fill(T::ZERO);
     link.linearise(end, part_mut(offset, 0, next.given_states), (&mut *columns, ld))?;
@@ -220,9 +255,9 @@ fn write_link_to_qp<T: Real>(
         *offset = *offset - dot(column, v);
     }
     let variable_count = size.nx + size.free;
-    stage_conversion::write_start_columns(next, variable_count, columns, ld);
+    stage_conversion::write_start_columns(begin, [size.nx, variable_count], columns, ld);
     if exact {
-        // The gradient of what is quadratic is `∇f − H v`: with another `H`.
+        // The gradient at zero is `∇f − H v`; it changes with `H`.
         add_symmetric(gradient, hessian, ld, v, n);
         let mut terms = QuadraticTerms { free: end.free, gradient: &mut [], hessian, ld };
         link.add_hessian(end, part(pi, 0, next.given_states), &mut terms);
@@ -236,36 +271,66 @@ fn write_link_to_qp<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
-    /// The objective at some point; in `ends` the ends of all intervals, and constraints.
+    /// Sets the step length of lifted stages for the next evaluation; returns the sum and the
+    /// largest of the residuals of their equations.
+    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2] {
+        let stages = self.phases.iter_mut().map(|phase| phase.problem.stage_residuals(step_length));
+        stages.fold([T::ZERO; 2], add_stage_residuals)
+    }
+
+    /// Loads the stages of each phase as its trial point.
+    fn load_trials<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
+        let mut previous_stage = stages.next();
+        for (phase, trial) in self.phases.iter().zip(&mut self.trial_points) {
+            previous_stage =
+                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+        }
+    }
+
+    /// Runs a function for each phase and its trial point.
+    ///
+    /// # Errors
+    /// The first error of a phase, with its number.
+    fn each_phase(
+        &mut self,
+        mut run: impl FnMut(&mut dyn Phase<T>, &TrialPoint<T>) -> Result<(), OcpError>,
+    ) -> Result<(), OcpError> {
+        for (index, (phase, trial)) in self.phases.iter_mut().zip(&self.trial_points).enumerate() {
+            run(phase.problem, trial).map_err(|error| error.in_phase(index))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the objective at a point; writes the ends of all intervals, then constraints, to
+    /// `ends`.
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         trial_point: &Solution<T, D, M>,
         (mut ends, mut values): (&mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
         let (mut objective, mut stages) = (T::ZERO, trial_point.stages());
-        let mut next_sizes: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
-        let Phases { phases, trial_points: trials, initial_state: start } = self;
-        let mut nexts = next_sizes.drain(..);
+        let Phases { phases, trial_points, initial_state } = self;
         let mut previous_stage = stages.next();
-        if let (Some(size), Some(start_variables)) = (nexts.next(), previous_stage) {
-            let first = take_mut(&mut ends, size.nx + size.free);
-            copy_common(first, start);
-            stage_conversion::write_start_state(size, start_variables.u, first);
+        if let (Some(JoinedPhase { begin, .. }), Some(start_variables)) = (phases.first(), previous_stage) {
+            let first = take_mut(&mut ends, begin.size.nx + begin.size.free);
+            copy_common(first, initial_state);
+            stage_conversion::write_start_state(begin, start_variables.u, &[], first);
         }
-        for (phase, trial) in phases.iter_mut().zip(trials) {
+        for (index, (phase, trial)) in phases.iter_mut().zip(trial_points).enumerate() {
             let last =
-                stage_conversion::load_phase(phase.size, &mut stages, &mut trial.point, previous_stage);
-            objective = objective + phase.problem.evaluate(&trial.point, &mut trial.ends)?;
-            write_ends(phase.size, trial, &mut ends, &mut values);
-            if let (Some(next), Some(last)) = (nexts.next(), last) {
-                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
+                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+            let cost = phase.problem.evaluate(&trial.point, &mut trial.ends);
+            objective = objective + cost.map_err(|error| error.in_phase(index))?;
+            write_ends(phase.begin.size, trial, &mut ends, &mut values);
+            if let Some(last) = &last {
+                phase.write_start(trial, last, &mut ends).map_err(|error| error.in_phase(index))?;
             }
             previous_stage = last;
         }
         Ok(objective)
     }
 
-    /// The QPs of all phases as that of the whole, with the links between them.
+    /// Writes the QPs of all phases, with the links between them, to the QP of the joined problem.
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: &mut Qp<T, D, M>,
@@ -275,26 +340,28 @@ impl<T: Real> Phases<'_, T> {
     ) -> Result<(), OcpError> {
         let ((v, _), mut begin) = (iterate.variables_and_costates(), 0);
         let (mut stages, mut points) = (qp.stages_mut(), iterate.stages());
-        let next_sizes = self.next_sizes();
         if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
         {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
             copy_common(offset, &self.initial_state);
-            stage_conversion::write_start_columns(first.size, point.x.len(), matrix, ld);
+            stage_conversion::write_start_columns(&first.begin, [0, point.x.len()], matrix, ld);
             begin += ld;
         }
-        for (JoinedPhase { problem, link, size, .. }, next) in self.phases.iter_mut().zip(next_sizes) {
+        for (index, JoinedPhase { problem, link, begin: phase, next, .. }) in
+            self.phases.iter_mut().enumerate()
+        {
             for (from, stage_point) in problem.qp().stages().zip(problem.iterate().stages()) {
                 let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
                 let mut arrays = to.arrays();
-                stage_conversion::copy_stage_qp(*size, &from, &mut arrays);
+                stage_conversion::copy_stage_qp(phase.size, &from, &mut arrays);
                 let v = part(v, begin, arrays.ld);
                 begin += arrays.ld;
-                // The last stage of a phase leads nowhere in its own QP.
-                if let (Some(next), Some(link), true) = (next, &mut *link, stage_point.dynamics.is_empty()) {
+                // In the QP of a phase its last stage has no dynamics.
+                if let (Some(next), Some(link), true) = (&*next, &mut *link, stage_point.dynamics.is_empty())
+                {
                     let (end, sizes, point_and_costates) =
-                        (problem.phase_end(stage_point), [*size, next], (v, point.dynamics));
+                        (problem.phase_end(stage_point), (phase.size, next), (v, point.dynamics));
                     write_link_to_qp(
                         link.as_mut(),
                         end,
@@ -303,30 +370,33 @@ impl<T: Real> Phases<'_, T> {
                         point_and_costates,
                         scratch,
                         kind,
-                    )?;
+                    )
+                    .map_err(|error| error.in_phase(index))?;
                 }
             }
         }
         Ok(())
     }
 
-    /// A constraint of the QP by its name in its phase.
+    /// Returns the name of a constraint of the QP in its phase.
     fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
         let unnamed = (Part::Dimensions, "");
         let find_name = || {
             let found = self.at(stage);
             let has_start_variables =
-                found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
+                found.is_none_or(|(_, phase)| stage == phase.first + phase.begin.size.intervals);
             let (number, place) = if has_start_variables && field == QpField::ControlBounds {
                 let number = found.map_or(0, |(number, _)| number + 1);
-                let PhaseSize { given_states: given, .. } = self.phases.get(number)?.size;
-                let states = self.phases.get(number)?.size.free_start_states().len();
-                let state = (QpField::StateBounds, 0, given + index);
-                let parameter = index.checked_sub(states);
+                let begin = &self.phases.get(number)?.begin;
+                let states = begin.size.free_start_states().len();
+                let state = (QpField::StateBounds, 0, begin.size.given_states + index);
+                let parameter = index
+                    .checked_sub(states)
+                    .and_then(|start_variables| begin.parameters().nth(start_variables));
                 (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
             } else {
                 let (number, phase) = found?;
-                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.size);
+                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.begin.size);
                 let place = match field {
                     QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
                     QpField::ControlBounds => (field, k, index + free),

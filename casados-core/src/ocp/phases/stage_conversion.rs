@@ -1,13 +1,14 @@
-//! What goes from a phase to the whole and back: points with their multipliers, bounds, and QPs.
+//! Conversion between phases and the joined problem: points with their multipliers, bounds, and
+//! QPs.
 //!
 //! ```text
 //! stage of a phase   (x | w, u)        of the whole   (x, w | u)        w₊ = w
 //! ```
 //!
-//! The order of variables is the same: what are controls `w` of a phase, shared by its stages, are
-//! states of the whole.
+//! The order of variables is the same: the controls `w` of a phase, shared by its stages, are
+//! states of the joined problem.
 
-use super::phase::PhaseSize;
+use super::phase::{PhaseSize, PhaseStart};
 use crate::qp::element::set;
 use crate::qp::{
     Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, copy_common,
@@ -15,10 +16,10 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 
-/// A point of the whole, at the stages of a phase, as one of the phase; `before` is the stage at
-/// which its start was decided, the result the one at its end.
+/// Reads a point of the joined problem at the stages of a phase. The start of the phase is decided
+/// at `previous_stage`; returns the last stage of the phase.
 pub(super) fn load_phase<'s, T: Real>(
-    size: PhaseSize,
+    begin: &PhaseStart,
     from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
     to: &mut HeapSolution<T>,
     previous_stage: Option<SolutionStage<'s, T>>,
@@ -26,18 +27,19 @@ pub(super) fn load_phase<'s, T: Real>(
     let (mut last, mut start_stage) = (None, previous_stage);
     to.each_stage_mut(|to| {
         let Some(from) = from.next() else { return };
-        load_phase_stage(size, &from, to, start_stage.take());
+        load_phase_stage(begin, &from, to, start_stage.take());
         last = Some(from);
     });
     last
 }
 
 fn load_phase_stage<T: Real>(
-    size @ PhaseSize { nx, free, .. }: PhaseSize,
+    begin: &PhaseStart,
     from: &SolutionStage<'_, T>,
     to: SolutionStageMut<'_, T>,
     previous_stage: Option<SolutionStage<'_, T>>,
 ) {
+    let PhaseSize { nx, free, .. } = begin.size;
     for (x, u, to_x, to_u) in [
         (from.x, from.u, to.x, &mut *to.u),
         (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
@@ -52,25 +54,23 @@ fn load_phase_stage<T: Real>(
     copy_common(to.dynamics, from.dynamics);
     copy_common(to.g_lower, from.g_lower);
     copy_common(to.g_upper, from.g_upper);
-    // What is decided has its bounds where it is.
+    // The multipliers of decided variables are at the stage before.
     if let Some(before) = previous_stage {
         for (from, x, u) in
             [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
         {
-            let (states, parameters) =
-                from.split_at_checked(size.free_start_states().len()).unwrap_or_default();
-            copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
-            copy_common(u, part(parameters, 0, free));
+            scatter_start_variables(begin, from, x, u);
         }
     }
 }
 
-/// A stage of a phase as one of the whole; with the first stage of the next phase, where it ends.
+/// Writes a stage of a phase to the joined problem, and to the last stage the start of the next
+/// phase.
 pub(super) fn store_phase_stage<T: Real>(
     PhaseSize { free, .. }: PhaseSize,
     from: &SolutionStage<'_, T>,
     to: SolutionStageMut<'_, T>,
-    next: Option<(PhaseSize, SolutionStage<'_, T>)>,
+    next: Option<(&PhaseStart, SolutionStage<'_, T>)>,
 ) {
     for (x, u, to_x, to_u) in [
         (from.x, from.u, to.x, &mut *to.u),
@@ -86,14 +86,15 @@ pub(super) fn store_phase_stage<T: Real>(
     copy_common(to.dynamics, from.dynamics);
     copy_common(to.g_lower, from.g_lower);
     copy_common(to.g_upper, from.g_upper);
-    if let Some((size, next)) = next {
-        write_start_variables(size, &next, to.u, to.u_lower, to.u_upper);
+    if let Some((begin, next)) = next {
+        write_start_variables(begin, &next, to.u, to.u_lower, to.u_upper);
     }
 }
 
-/// What is decided where a phase begins, from its first stage, with the multipliers of its bounds.
+/// Writes the variables that are decided at the start of a phase, from its first stage, with the
+/// multipliers of their bounds.
 pub(super) fn write_start_variables<T: Real>(
-    size: PhaseSize,
+    begin: &PhaseStart,
     first: &SolutionStage<'_, T>,
     to: &mut [T],
     lower: &mut [T],
@@ -102,48 +103,63 @@ pub(super) fn write_start_variables<T: Real>(
     for (to, x, u) in
         [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
     {
-        gather_start_variables(size, x, u, to);
+        gather_start_variables(begin, x, u, to);
     }
 }
 
-/// Of a vector over the first states and controls of a phase the elements that are decided where it
-/// begins: states that are free there, then free parameters.
-fn gather_start_variables<T: Real>(size: PhaseSize, x: &[T], u: &[T], to: &mut [T]) {
+/// Gathers the elements that are decided at the start of a phase, from a vector over its first
+/// states and controls: free states, then free parameters.
+fn gather_start_variables<T: Real>(begin: &PhaseStart, x: &[T], u: &[T], to: &mut [T]) {
+    let size = begin.size;
     let (states, parameters) = to.split_at_mut_checked(size.free_start_states().len()).unwrap_or_default();
     copy_common(states, x.get(size.free_start_states()).unwrap_or_default());
-    copy_common(parameters, part(u, 0, size.free));
+    for (to, w) in parameters.iter_mut().zip(begin.parameters()) {
+        copy_common(core::slice::from_mut(to), part(u, w, 1));
+    }
 }
 
-/// Six vectors of bounds and penalties.
+/// Scatters the elements that are decided at the start of a phase: the inverse of
+/// [`gather_start_variables`].
+fn scatter_start_variables<T: Real>(begin: &PhaseStart, decided: &[T], x: &mut [T], u: &mut [T]) {
+    let size = begin.size;
+    let (states, parameters) = decided.split_at_checked(size.free_start_states().len()).unwrap_or_default();
+    copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
+    for (&from, w) in parameters.iter().zip(begin.parameters()) {
+        set(u, w, from);
+    }
+}
+
+/// Returns the six vectors of bounds and penalties.
 fn bound_vectors<'a, T>(bounds: &Bounds<'a, T>) -> [&'a [T]; 6] {
     let Bounds { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = *bounds;
     [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
 }
 
-/// Six vectors of bounds and penalties.
+/// Returns the six vectors of bounds and penalties.
 fn bound_vectors_mut<T>(bounds: BoundsMut<'_, T>) -> [&mut [T]; 6] {
     let BoundsMut { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = bounds;
     [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
 }
 
-/// Where in a horizon of phases a stage is, for its bounds.
+/// The position of a stage among the phases, for its bounds.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum StagePosition {
-    /// The first stage of all: its states are given or decided.
+    /// The first stage of all phases: its states are fixed or decided.
     FirstStage,
     /// The first stage of another phase.
     PhaseStart,
     InteriorStage,
 }
 
-/// Bounds of a stage, without those of what is decided before it, and of integrals where these
-/// begin.
+/// Copies the bounds of a stage, except bounds of variables decided at the stage before, and of
+/// integrals at the start of a phase.
 pub(super) fn copy_stage_bounds<T: Real>(
-    PhaseSize { nx, free, model_states: own, .. }: PhaseSize,
+    begin: &PhaseStart,
     from: &Stage<'_, T>,
     to: &mut StageMut<'_, T>,
     position: StagePosition,
 ) {
+    let PhaseSize { nx, free, model_states: own, .. } = begin.size;
     let control_bounds = bound_vectors(&from.u_bounds());
     let count = match position {
         StagePosition::FirstStage => 0,
@@ -155,8 +171,12 @@ pub(super) fn copy_stage_bounds<T: Real>(
         .zip(bound_vectors(&from.x_bounds()).into_iter().zip(control_bounds))
     {
         copy_common(part_mut(to, 0, count), x);
-        if position == StagePosition::InteriorStage {
-            copy_common(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
+        for (w, shared) in begin.shared.iter().enumerate() {
+            if position == StagePosition::InteriorStage
+                || position == StagePosition::PhaseStart && shared.is_some()
+            {
+                copy_common(part_mut(to, nx + w, 1), part(u, w, 1));
+            }
         }
     }
     for (to, from) in bound_vectors_mut(to.u_bounds_mut()).into_iter().zip(control_bounds) {
@@ -167,36 +187,52 @@ pub(super) fn copy_stage_bounds<T: Real>(
     }
 }
 
-/// Bounds of what is decided where a phase begins, from its first stage.
+/// Writes the bounds of the variables that are decided at the start of a phase, from its first
+/// stage.
 pub(super) fn write_start_variable_bounds<T: Real>(
-    size: PhaseSize,
+    begin: &PhaseStart,
     first: &Stage<'_, T>,
     to: &mut StageMut<'_, T>,
 ) {
     let first_bounds = bound_vectors(&first.x_bounds()).into_iter().zip(bound_vectors(&first.u_bounds()));
     for (to, (x, u)) in bound_vectors_mut(to.u_bounds_mut()).into_iter().zip(first_bounds) {
-        gather_start_variables(size, x, u, to);
+        gather_start_variables(begin, x, u, to);
     }
 }
 
-/// Where a phase begins: what is decided, and zero of what is neither decided nor given.
-pub(super) fn write_start_state<T: Real>(size: PhaseSize, start_variables: &[T], start: &mut [T]) {
-    let (states, parameters) =
-        start_variables.split_at_checked(size.free_start_states().len()).unwrap_or_default();
-    let (x, w) = start.split_at_mut_checked(size.nx).unwrap_or_default();
-    x.get_mut(size.given_states..).unwrap_or_default().fill(T::ZERO);
-    copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
-    copy_common(w, parameters);
+/// Writes the start of a phase: the decided elements, and the shared parameters `before` of the
+/// phase before; elements neither decided nor given are zero.
+pub(super) fn write_start_state<T: Real>(begin: &PhaseStart, decided: &[T], before: &[T], start: &mut [T]) {
+    let (x, w) = start.split_at_mut_checked(begin.size.nx).unwrap_or_default();
+    x.get_mut(begin.size.given_states..).unwrap_or_default().fill(T::ZERO);
+    scatter_start_variables(begin, decided, x, w);
+    for (w, shared) in w.iter_mut().zip(&begin.shared) {
+        if let Some(shared) = *shared {
+            copy_common(core::slice::from_mut(w), part(before, shared, 1));
+        }
+    }
 }
 
-/// The same as columns of the QP, where what is decided are the variables from `first` on.
-pub(super) fn write_start_columns<T: Real>(size: PhaseSize, first: usize, columns: &mut [T], ld: usize) {
-    for (j, state) in size.free_start_states().chain(size.nx..size.nx + size.free).enumerate() {
+/// Writes the columns of [`write_start_state`] to the QP; the decided variables begin at `first`,
+/// the parameters of the phase before at `before`.
+pub(super) fn write_start_columns<T: Real>(
+    begin: &PhaseStart,
+    [before, first]: [usize; 2],
+    columns: &mut [T],
+    ld: usize,
+) {
+    let nx = begin.size.nx;
+    for (j, state) in begin.size.free_start_states().chain(begin.parameters().map(|w| nx + w)).enumerate() {
         set(columns, state * ld + first + j, T::ONE);
     }
+    for (w, shared) in begin.shared.iter().enumerate() {
+        if let Some(shared) = *shared {
+            set(columns, (nx + w) * ld + before + shared, T::ONE);
+        }
+    }
 }
 
-/// The QP at a stage, without what leads to another phase.
+/// Copies the QP of a stage, without the link to the next phase.
 pub(super) fn copy_stage_qp<T: Real>(
     PhaseSize { nx, free, .. }: PhaseSize,
     from: &Stage<'_, T>,

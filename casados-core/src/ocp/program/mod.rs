@@ -13,7 +13,11 @@ use core::ops::Range;
 
 impl<P: Formulation<T>, T: Real> Program<T> for P {
     type Dynamics = P::Dynamics;
-    const LIFTED: bool = P::Dynamics::LIFTED;
+
+    #[inline(always)]
+    fn is_lifted(&self) -> bool {
+        P::Dynamics::LIFTED
+    }
 
     fn linearise<C: Curvature<P::Dynamics, T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,

@@ -1,5 +1,4 @@
-//! What an outcome says beyond its status: whether the problem is known to be convex, and of a run
-//! that ends without a solution the bound that its iterate violates most.
+//! Whether a problem is known to be convex, and the largest violation of an iterate.
 
 use crate::ocp::formulation::error::ConstraintName;
 use crate::ocp::formulation::functions::constraint::Constraints;
@@ -12,8 +11,8 @@ use crate::qp::StageDims;
 use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Whether the problem is known to be convex, and the bound that is violated most, if somebody
-    /// `asks` for it.
+    /// Returns whether the problem is known to be convex, and the largest violation of the iterate,
+    /// if `with_violation`.
     pub(in crate::ocp) fn convexity_and_violation(
         &mut self,
         with_violation: bool,

@@ -1,4 +1,4 @@
-//! The bound that an iterate violates most: what a run that ends without a solution names.
+//! The largest violation of a hard bound, reported by runs without a solution.
 
 use crate::ocp::formulation::error::ConstraintName;
 use crate::ocp::formulation::functions::constraint::Constraints;
@@ -11,7 +11,7 @@ use crate::qp::{QpField, Side, StageDims, part, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Violations from here on, relative to their bound where that is above one, are named.
+/// The smallest reported violation, relative to bounds above one.
 const MIN_REPORTED_VIOLATION: f64 = 1e-6;
 
 /// The largest violation so far.
@@ -21,7 +21,7 @@ struct LargestViolation {
 }
 
 impl LargestViolation {
-    /// A value between its bounds, of which a side with a finite penalty is soft.
+    /// Compares a value with its bounds; those with finite penalties are soft and ignored.
     fn update<T: Real>(&mut self, place: (QpField, usize, usize), value: T, sides: [(Side, T, T); 2]) {
         for (side, bound, penalty) in sides {
             let (value, bound) = (value.to_f64(), bound.to_f64());
@@ -36,7 +36,8 @@ impl LargestViolation {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The hard bound that the iterate violates most; none where functions have no value.
+    /// Returns the largest violation of a hard bound at the iterate; `None` if a function is not
+    /// finite.
     pub(super) fn largest_violation(&mut self) -> Option<(ConstraintName, f64)> {
         let (intervals, layout) = (self.intervals(), self.layout());
         let path = path_row_count::<P, T>(layout);

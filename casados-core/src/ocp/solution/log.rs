@@ -1,9 +1,9 @@
-//! What happened, as data.
+//! The log of a run.
 
 use crate::qp::Residuals;
 use core::fmt;
 
-/// Seconds that an iteration took; zero without the feature `std`.
+/// Seconds of an iteration; zero without the feature `std`.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -27,21 +27,21 @@ use core::fmt;
 pub struct Times {
     /// Integration and derivatives of all functions.
     pub linearise: f64,
-    /// The QP, and those of corrections.
+    /// QPs with their inertia corrections, or Newton steps.
     pub qp: f64,
-    /// The line search without its QPs.
+    /// The line search, with its second-order corrections.
     pub search: f64,
 }
 
 impl Times {
-    /// All together.
+    /// The sum of all parts.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.linearise + self.qp + self.search
     }
 }
 
-/// An iteration: where it began, and how it went on.
+/// An iteration: its iterate, and the step from there.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -65,35 +65,36 @@ impl Times {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Iteration {
-    /// Counted from zero.
+    /// The index, from zero.
     pub iteration: usize,
     /// The objective at the iterate, with penalties of soft bounds.
     pub objective: f64,
-    /// The conditions of optimality at the iterate.
+    /// The residuals of the optimality conditions at the iterate.
     pub residuals: Residuals,
-    /// The part of the step that was taken; zero in the last iteration, and where the iterate stays
-    /// since no step was short enough or the QP was not solved.
+    /// The step length; zero in the last iteration, and if the iterate is unchanged since the line
+    /// search or the QP failed.
     pub step: f64,
-    /// Iterations of QPs; of an interior point, which has none, zero, and `-` in the table.
+    /// QP iterations; zero for an interior point, printed as `-`.
     pub qp_iterations: usize,
-    /// What was added to the diagonal of the Hessian because the QP was not convex
-    /// ([`Convexification::Reduced`](crate::ocp::Convexification)).
+    /// The regularisation of the Hessian: the inertia correction
+    /// ([`Convexification::Reduced`](crate::ocp::Convexification); `δ_w` of an interior point), or
+    /// damping.
     pub regularisation: f64,
-    /// Whether bounds had penalties because the QP was infeasible.
+    /// Whether hard bounds have penalties: elastic mode or restoration phase.
     pub elastic: bool,
     /// Whether the step has a second-order correction.
     pub corrected: bool,
-    /// Whether the start is a point beside the guess, where the gradient of a violated constraint
-    /// vanishes. Said of the first iteration.
+    /// Whether the guess was perturbed, since the gradient of a violated constraint vanishes there.
+    /// Set in the first iteration.
     pub perturbed: bool,
     /// The barrier parameter `μ`; zero in sequential quadratic programming.
     pub barrier: f64,
-    /// How long it took.
+    /// The times of the parts.
     pub times: Times,
 }
 
-/// A row of the table that [`Log`] prints, without the end of the line: for an observer that shows
-/// how a run goes on.
+/// A row of the table that [`Log`] prints, without the end of the line, for an observer that shows
+/// the progress of a run.
 ///
 /// ```
 /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Log, Map, Problem};
@@ -136,7 +137,7 @@ impl fmt::Display for Iteration {
             self.step,
             self.regularisation,
         )?;
-        // An interior point has steps of Newton's method in the place of QPs.
+        // An interior point has Newton steps instead of QPs.
         match self.barrier > 0.0 {
             true => f.write_str("     -")?,
             false => write!(f, "{:6}", self.qp_iterations)?,
@@ -146,8 +147,7 @@ impl fmt::Display for Iteration {
     }
 }
 
-/// Iterations, to be printed as the familiar table. Marks behind the length of a step are explained
-/// below it.
+/// Iterations, printed as a table. Marks after the step length are explained below it.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -200,7 +200,7 @@ mod tests {
     use alloc::string::ToString;
     use alloc::vec::Vec;
 
-    /// What stands below the rows.
+    /// The lines below the rows.
     fn explained_marks(rows: &[Iteration]) -> Vec<alloc::string::String> {
         Log(rows).to_string().lines().skip(1 + rows.len()).map(ToString::to_string).collect()
     }
@@ -211,7 +211,7 @@ mod tests {
         let row = |row: Iteration| row.to_string().split_whitespace().nth(8).map(ToString::to_string);
         assert_eq!(row(Iteration { qp_iterations: 7, ..plain }).as_deref(), Some("7"));
         assert_eq!(row(Iteration { barrier: 1e-9, ..plain }).as_deref(), Some("-"));
-        // Columns stay where they are.
+        // The columns are aligned.
         let length = |row: Iteration| row.to_string().len();
         assert_eq!(length(plain), length(Iteration { barrier: 0.1, ..plain }));
     }

@@ -1,10 +1,10 @@
-//! What errors say: what, where by name, the values, and the way out.
+//! Messages of errors: the name and place, the values, and the remedy.
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
 use crate::qp::{QpField, Side};
 use core::fmt;
 
-/// The remedy where a function has no value, or no derivative.
+/// The remedy for functions and derivatives that are not finite.
 const OUTSIDE_DOMAIN: &str = "take another guess, or bounds that keep the variables inside its domain";
 
 impl Part {
@@ -63,7 +63,16 @@ impl fmt::Display for ConstraintName {
             _ if self.point > 0 => write!(f, " at point {} inside of interval {}", self.point, self.stage)?,
             _ => write!(f, " at stage {}", self.stage)?,
         }
-        match self.phase {
+        OfPhase(self.phase).fmt(f)
+    }
+}
+
+/// ` of phase 1`, or nothing.
+struct OfPhase<T>(Option<T>);
+
+impl<T: fmt::Display> fmt::Display for OfPhase<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
             Some(phase) => write!(f, " of phase {phase}"),
             None => Ok(()),
         }
@@ -170,11 +179,11 @@ impl fmt::Display for OcpError {
                     false => "at the nodes: maps have no algebraic states",
                 })
             }
-            Self::NonFiniteFunction { function, stage, output, value } => {
-                write!(f, "stage {stage}: output {output} of `{function}` is {value}: {OUTSIDE_DOMAIN}")
+            Self::NonFiniteFunction { function, stage, output, value, phase } => {
+                write!(f, "stage {stage}{}: output {output} of `{function}` is {value}: {OUTSIDE_DOMAIN}", OfPhase(*phase))
             }
-            Self::NonFiniteDerivative { field, stage, of, output, by, value } => {
-                write!(f, "stage {stage}: ")?;
+            Self::NonFiniteDerivative { field, stage, of, output, by, value, phase } => {
+                write!(f, "stage {stage}{}: ", OfPhase(*phase))?;
                 match field {
                     QpField::A | QpField::B => write!(f, "the derivative of the next `{of}` by `{by}`")?,
                     QpField::C | QpField::D => write!(f, "the derivative of output {output} of `{of}` by `{by}`")?,
@@ -188,7 +197,9 @@ impl fmt::Display for OcpError {
                 "stage {stage}: the derivative of the solution `{of}` by `{by}` is {value}: scale states, controls and \
                  costs to about one"
             ),
-            Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Integration { interval, error, phase } => {
+                write!(f, "interval {interval}{}: {error}", OfPhase(*phase))
+            }
             Self::Simulation { interval, state, value, error } => write!(
                 f,
                 "the simulation of the guess failed in interval {interval}, at `{state}` = {value:e}: {error}. Change \
@@ -261,7 +272,7 @@ impl fmt::Display for OcpError {
     }
 }
 
-/// Where it is, unless it is in one place alone.
+/// Writes the stage, unless the part belongs to one stage only.
 fn write_stage(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result {
     match part {
         Part::InitialState | Part::TerminalReference | Part::Memory => Ok(()),
@@ -269,7 +280,7 @@ fn write_stage(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Res
     }
 }
 
-/// One of the elements of a part, which are outputs of a function or have names of their own.
+/// Writes the name of an element of a part: an output of a function, or a variable.
 fn write_element_name(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fmt::Result {
     match part {
         Part::PathBounds | Part::TerminalBounds | Part::Reference | Part::TerminalReference => {

@@ -1,4 +1,4 @@
-//! Results: how a run ended, its log, solutions by name, and their derivatives.
+//! Results: outcomes, logs, solutions by name, and their derivatives.
 
 pub(in crate::ocp) mod convexity;
 #[cfg(feature = "alloc")]

@@ -1,4 +1,4 @@
-//! How a run ended.
+//! The outcome of a run.
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::instance::Ocp;
@@ -8,7 +8,7 @@ use crate::qp::{QpError, Residuals, StageDims, Violation};
 use crate::scalar::Real;
 use core::fmt;
 
-/// How a run ended.
+/// The status at the end of a run.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem, Status};
@@ -39,21 +39,20 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Status {
-    /// The conditions of optimality hold: the iterate is a local solution, of a convex problem a
-    /// global one ([`Outcome::is_convex`]).
+    /// The optimality conditions hold: the iterate is a local solution, and a global one if the
+    /// problem is convex ([`Outcome::is_convex`]).
     Converged,
-    /// The conditions of optimality hold to the acceptable tolerance, and no better point was
-    /// found.
+    /// The optimality conditions hold to the acceptable tolerance, and no better point was found.
     Acceptable,
     /// The maximum number of iterations was reached.
     MaxIterations,
-    /// The observer stopped it.
+    /// The observer stopped the run.
     Stopped,
     /// The time limit was reached.
     OutOfTime,
-    /// Variables have become very large, and from there on there is a ray of points that satisfy
-    /// all constraints, along which the objective falls without end: something is missing that
-    /// bounds it. [`Ipm`](crate::ocp::Ipm) says so.
+    /// Unbounded: variables are very large, and there is a recession direction, a ray of feasible
+    /// points along which the objective decreases without bound. Add bounds or costs. A status of
+    /// [`Ipm`](crate::ocp::Ipm).
     ///
     /// ```
     /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem, Status};
@@ -76,33 +75,34 @@ pub enum Status {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     Unbounded,
-    /// Locally infeasible: gaps are less than violations, and no step makes the sum of both smaller
-    /// by a thousandth, in [`Ipm`](crate::ocp::Ipm) that of violations by a hundredth, to first
-    /// order. Elsewhere there may be points that satisfy all constraints. This is the one that the
-    /// iterate violates most.
+    /// Locally infeasible: gaps are smaller than violations and, to first order, no step decreases
+    /// the sum of both by a thousandth (in [`Ipm`](crate::ocp::Ipm) the sum of violations by 1e-4).
+    /// There may be feasible points elsewhere. The constraint is the one with the largest
+    /// violation.
     Infeasible {
-        /// The constraint.
+        /// The constraint with the largest violation.
         constraint: ConstraintName,
-        /// By how much it is violated.
+        /// Its violation.
         violation: f64,
     },
     /// A QP was infeasible, and elastic mode is off.
     InfeasibleQp {
         /// A constraint that cannot be satisfied.
         constraint: ConstraintName,
-        /// By how much it is violated at least.
+        /// A lower bound of its violation.
         violation: f64,
     },
     /// A QP was not solved for another reason.
     QpFailed(QpError),
-    /// No step was short enough to make progress.
+    /// No acceptable step was found.
     NoProgress,
 }
 
-/// The outcome of a run. The iterate of the problem is the best one, whatever the status.
+/// The outcome of a run. The iterate of the problem is the best one, or the last one after
+/// `Converged` and `Infeasible`.
 ///
-/// Runs return it; it prints itself in a line. Whether the iterate is a solution, `is_converged`
-/// says, and `is_solved` by a lower standard.
+/// It is displayed in one line. `is_converged` tests the status for the tolerance, `is_solved` for
+/// the acceptable tolerance.
 ///
 /// ```
 /// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem};
@@ -125,32 +125,30 @@ pub enum Status {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Outcome {
-    /// How it ended.
+    /// The status at the end.
     pub status: Status,
-    /// Steps.
+    /// The number of steps.
     pub iterations: usize,
     /// The objective at the iterate.
     pub objective: f64,
-    /// The conditions of optimality at the iterate.
+    /// The residuals of the optimality conditions at the iterate.
     pub residuals: Residuals,
-    /// Iterations of all QPs.
+    /// The iterations of all QPs.
     pub qp_iterations: usize,
-    /// How long all of it took.
+    /// The sum of the times of all iterations.
     pub times: Times,
-    /// Whether the problem is known to be convex: its dynamics and constraints are linear, its
-    /// costs convex functions of linear ones. Then a solution is a global one; else it is a local
-    /// one, and another guess may lead to a better one
-    /// ([`Ocp::multi_start`](crate::ocp::Ocp::multi_start)).
+    /// Whether the problem is known to be convex: linear dynamics and constraints, and convex
+    /// costs. Then a solution is a global minimum; otherwise it is a local one, and another guess
+    /// may lead to a better one ([`Ocp::multi_start`](crate::ocp::Ocp::multi_start)).
     pub is_convex: bool,
-    /// Of a run that ends without a solution, and whose status names no constraint: the hard bound
-    /// that the iterate violates most, and by how much (feature `alloc`). Iterates of
-    /// [`Ipm`](crate::ocp::Ipm) are inside of the bounds of states and controls: there what is left
-    /// is in `residuals.dynamics`.
+    /// The largest violation of a hard bound, if the run ends without a solution and the status
+    /// names no constraint (feature `alloc`). Iterates of [`Ipm`](crate::ocp::Ipm) are inside the
+    /// bounds of states and controls; their violations are the gaps, `residuals.dynamics`.
     pub violated: Option<(ConstraintName, f64)>,
 }
 
 impl Outcome {
-    /// Of a run that begins.
+    /// The outcome at the start of a run.
     pub(in crate::ocp) fn new() -> Self {
         Self {
             status: Status::MaxIterations,
@@ -164,7 +162,7 @@ impl Outcome {
         }
     }
 
-    /// Counts what an iteration took.
+    /// Adds QP iterations and times of an iteration.
     pub(in crate::ocp) fn add_iteration(&mut self, row: &Iteration) {
         self.qp_iterations += row.qp_iterations;
         self.times.linearise += row.times.linearise;
@@ -172,15 +170,15 @@ impl Outcome {
         self.times.search += row.times.search;
     }
 
-    /// Whether the conditions of optimality hold to the tolerance: then multipliers are those of
+    /// Whether the optimality conditions hold to the tolerance. Then the multipliers are those of
     /// the solution, too.
     #[must_use]
     pub fn is_converged(&self) -> bool {
         self.status == Status::Converged
     }
 
-    /// Whether states and controls are those of a solution: the conditions hold to the tolerance,
-    /// or to the acceptable one where rounding or scaling leaves no better point.
+    /// Whether states and controls are those of a solution: the optimality conditions hold to the
+    /// tolerance, or to the acceptable one if no better point was found.
     ///
     /// ```
     /// # use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem};
@@ -206,12 +204,12 @@ impl Outcome {
 }
 
 impl Status {
-    /// Whether it says itself which constraint is violated.
+    /// Whether the status names a violated constraint.
     pub(in crate::ocp) fn names_constraint(&self) -> bool {
         matches!(self, Self::Infeasible { .. } | Self::InfeasibleQp { .. })
     }
 
-    /// What it is.
+    /// Writes a description.
     fn write_description(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Converged => f.write_str("converged"),
@@ -234,7 +232,7 @@ impl Status {
         }
     }
 
-    /// What to do about it.
+    /// The remedy.
     fn remedy(&self) -> &'static str {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
@@ -282,7 +280,7 @@ impl fmt::Display for Outcome {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Completes the outcome of a run.
+    /// Adds convexity and the largest violation to the outcome of a run.
     pub(in crate::ocp) fn complete_outcome(&mut self, outcome: &mut Outcome) {
         let needs_violation = !outcome.is_solved() && !outcome.status.names_constraint();
         let (is_convex, violated) = P::complete(self, needs_violation);
@@ -292,16 +290,16 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// The status of a run whose violations cannot be made smaller.
+    /// The status of a run with stationary violations.
     pub(in crate::ocp) fn infeasible_status(&self, worst: &Violation) -> Status {
         let Violation { field, stage, index, side, violation } = *worst;
         Status::Infeasible { constraint: self.name(field, stage, index, side), violation }
     }
 
-    /// The status of a run whose QP or Newton's equations have no solution.
+    /// The status of a run whose QP or Newton equations cannot be solved.
     ///
     /// # Errors
-    /// [`OcpError::NonFiniteDerivative`] if there is no such QP.
+    /// [`OcpError::NonFiniteDerivative`] if data of the QP are not finite.
     pub(in crate::ocp) fn qp_failure_status(&self, error: QpError) -> Result<Status, OcpError> {
         match (self.infeasible(&error), error) {
             (Some(constraint), QpError::Infeasible { violation, .. }) => {

@@ -1,4 +1,4 @@
-//! What an iterate is worth between its nodes: an integrator with error control goes along it.
+//! Verification of an iterate by an integrator with error control.
 
 use crate::integrator::Integrator;
 use crate::model::{Dae, VectorX};
@@ -20,10 +20,10 @@ use bytemuck::Zeroable;
 use core::cmp::Ordering;
 use core::fmt;
 
-/// Pieces of an interval at whose ends bounds are looked at.
+/// The number of pieces of an interval at whose ends bounds are checked.
 const PIECES_PER_INTERVAL: usize = 8;
 
-/// What an iterate is worth, by an integrator with error control: [`Ocp::verify`].
+/// The accuracy of an iterate, measured by an integrator with error control: [`Ocp::verify`].
 ///
 /// [`Ocp::verify`]: crate::ocp::Ocp::verify
 ///
@@ -51,24 +51,24 @@ const PIECES_PER_INTERVAL: usize = 8;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification<T = f64> {
-    /// `φ(x_k, u_k) − x_{k+1}`, of one interval after the other, by size of the state.
+    /// The defects `φ(x_k, u_k) − x_{k+1}`, by intervals, relative to the magnitude of the state.
     defects: Vec<Defect<T>>,
     violations: Vec<InnerViolation<T>>,
     intervals: usize,
 }
 
-/// Where a state ends that an interval begins with, and where the next one begins.
+/// The defect of a state: the end of an interval minus the start of the next one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Defect<T = f64> {
-    /// The state.
+    /// The name of the state.
     pub state: &'static str,
-    /// The interval.
+    /// The index of the interval.
     pub interval: usize,
-    /// What the integrator with error control has at its end, less the state of the next node.
+    /// The end state of the integrator with error control minus the state of the next node.
     pub amount: T,
-    /// The size of this as a part of the largest value of the state at any node, or of one where
-    /// that is less than one.
+    /// The absolute defect relative to the largest magnitude of the state at any node, at least
+    /// one.
     pub relative: T,
 }
 
@@ -76,42 +76,42 @@ pub struct Defect<T = f64> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct InnerViolation<T = f64> {
-    /// The state, or the output of a path constraint.
+    /// The name of the state, or of the output of a path constraint.
     pub name: String,
-    /// The interval.
+    /// The index of the interval.
     pub interval: usize,
-    /// The time.
+    /// The time of the largest violation.
     pub time: T,
-    /// The side.
+    /// The violated side.
     pub side: Side,
-    /// By how much: the most in this interval.
+    /// The largest violation in this interval.
     pub amount: T,
-    /// This as a part of the bound, or of one where that is less than one.
+    /// The violation relative to the magnitude of the bound, at least one.
     pub relative: T,
 }
 
 impl<T: Real> Verification<T> {
-    /// All defects: those of the states of an interval, one interval after the other.
+    /// All defects of states, by intervals.
     #[must_use]
     pub fn defects(&self) -> &[Defect<T>] {
         &self.defects
     }
 
-    /// The defect that is the largest part of its state.
+    /// The largest relative defect.
     #[must_use]
     pub fn largest_defect(&self) -> Option<Defect<T>> {
         self.defects.iter().copied().reduce(|a, b| if b.relative > a.relative { b } else { a })
     }
 
-    /// The largest violation of each bound in each interval, between the nodes, the largest part of
-    /// its bound first.
+    /// The largest violation of each bound in each interval, between the nodes, in descending order
+    /// of relative violations.
     #[must_use]
     pub fn violations(&self) -> &[InnerViolation<T>] {
         &self.violations
     }
 
-    /// The intervals that ask for shorter ones: where a defect or a violation is a larger part than
-    /// this. Ascending; for [`Horizon::refined`](crate::ocp::Horizon::refined).
+    /// Returns the intervals with a relative defect or violation above a tolerance, in ascending
+    /// order, for [`Horizon::refined`](crate::ocp::Horizon::refined).
     #[must_use]
     pub fn intervals(&self, tolerance: T) -> Vec<usize> {
         let of_defects = self.defects.iter().map(|defect| (defect.interval, defect.relative));
@@ -153,16 +153,17 @@ impl<T: Real> fmt::Display for Verification<T> {
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// Integrates every interval of the iterate from its node on, by an integrator of the same
-    /// model with error control, and says where that differs from the next node, and which bounds
-    /// of states and path constraints are violated at eighths between the nodes. A state has the
-    /// wider one of the bounds at both ends of an interval.
+    /// Integrates every interval of the iterate from its node by another integrator of the same
+    /// model, with error control. Returns the differences from the next nodes, and the violations
+    /// of bounds of states and path constraints at eighths between the nodes. The bounds of a state
+    /// are the wider ones of both ends of an interval.
     ///
-    /// Tolerances are those of the integrator: let them be a hundredth of what matters.
+    /// The accuracy is that of the integrator: choose its tolerances a hundredth of the relevant
+    /// errors.
     ///
     /// # Errors
-    /// [`OcpError::Integration`], [`OcpError::NonFiniteFunction`]; [`OcpError::Unsupported`] of
-    /// maps and return maps, which are no flow of a model; those of
+    /// [`OcpError::Integration`], [`OcpError::NonFiniteFunction`]; [`OcpError::Unsupported`] for
+    /// maps and return maps, which are not the flow of a model; the errors of
     /// [`Ocp::check`](crate::ocp::Ocp::check)
     pub fn verify<I>(&mut self, integrator: &mut I) -> Result<Verification<T>, OcpError>
     where
@@ -240,7 +241,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 }
 
-/// The largest value of every state at any node, at least one.
+/// The largest magnitude of every state at any node, at least one.
 fn state_magnitudes<'a, T: Real + 'a>(
     stages: impl Iterator<Item = SolutionStage<'a, T>>,
     nx: usize,
@@ -255,11 +256,11 @@ fn state_magnitudes<'a, T: Real + 'a>(
     Ok(sizes)
 }
 
-/// The largest violations inside of an interval: of states, then of path constraints.
+/// The largest violations inside an interval: of states, then of path constraints.
 struct IntervalViolations<V, T> {
     point: V,
     g: Vec<T>,
-    /// Amount of both sides, the time, and the bound.
+    /// Amount, time and bound for both sides.
     largest_violations: Vec<[LargestViolation<T>; 2]>,
     states: usize,
 }
@@ -287,7 +288,7 @@ impl<V: Zeroable, T: Real> IntervalViolations<V, T> {
         self.largest_violations.resize(self.states + self.g.len(), [none; 2]);
     }
 
-    /// A value beside its bounds.
+    /// Compares a value with its bounds.
     fn update_largest(&mut self, index: usize, value: T, [lower, upper]: [T; 2], time: T) {
         let Some(worst) = self.largest_violations.get_mut(index) else { return };
         for (worst, (amount, bound)) in worst.iter_mut().zip([(lower - value, lower), (value - upper, upper)])
@@ -316,7 +317,7 @@ impl<V: Zeroable, T: Real> IntervalViolations<V, T> {
         }
     }
 
-    /// Adds what was found, by name; times are multiplied by the duration of their unit.
+    /// Appends the violations by name; times are multiplied by the duration.
     fn append_violations<P: Formulation<T>>(
         &self,
         interval: usize,

@@ -1,4 +1,4 @@
-//! What may be a mistake in a problem before it is solved.
+//! Warnings about likely mistakes in a problem, before it is solved.
 
 use crate::linalg::dot;
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
@@ -6,19 +6,20 @@ use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::FirstOrder;
 use crate::qp::element::get;
-use crate::qp::{Bounds, Places, QpField, Side, part};
+use crate::qp::{Bounds, QpField, Side, StageOffsetsIter, part};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// A ratio of sizes of two variables that is too large for double precision and one tolerance.
+/// The ratio of magnitudes of two variables above which there is a warning: double precision and
+/// one tolerance do not suit both.
 const MAX_SIZE_RATIO: f64 = 1e8;
-/// A gradient vanishes where the constraint changes by no more than this part of its violation, if
-/// a variable changes by its size or by one.
+/// A gradient counts as vanishing if the change of each variable by its size, or by one, changes
+/// the constraint by at most this fraction of its violation.
 const VANISHING_GRADIENT_RATIO: f64 = 1e-8;
 
-/// What may be a mistake in a problem: [`Ocp::warnings`].
+/// A likely mistake in a problem: [`Ocp::warnings`].
 ///
 /// [`Ocp::warnings`]: crate::ocp::Ocp::warnings
 ///
@@ -46,7 +47,8 @@ const VANISHING_GRADIENT_RATIO: f64 = 1e-8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The guess of a variable violates its bounds; where it does so by most. Solvers move it.
+    /// The guess of a variable violates its bounds; the stage is that of the largest violation.
+    /// Solvers move the guess inside.
     GuessOutsideBounds {
         /// The bound.
         bound: ConstraintName,
@@ -55,30 +57,30 @@ pub enum Warning {
         /// The value of the bound.
         limit: f64,
     },
-    /// A constraint is violated at the guess, and its gradient is zero there, at this stage first:
-    /// its linearisation does not say where it holds. Solvers begin beside such a guess.
+    /// A constraint is violated at the guess, and its gradient vanishes there, so that its
+    /// linearisation has no solution. The stage is the first one. Solvers perturb such a guess.
     VanishingGradient {
-        /// The constraint, with the side that is violated.
+        /// The constraint, with the violated side.
         constraint: ConstraintName,
-        /// By how much it is violated.
+        /// The violation.
         violation: f64,
     },
-    /// A bound at the end of the horizon does not hold where the linearisation at the guess ends,
-    /// and no control, free start or free parameter changes that: no step leads there.
+    /// A bound at the end of the horizon is unreachable: the end of the linearisation at the guess
+    /// violates it, whatever the controls, the free initial state and the free parameters.
     UnreachableEnd {
         /// The bound.
         bound: ConstraintName,
-        /// Where the linearisation ends.
+        /// The value at the end of the linearisation.
         value: f64,
         /// The value of the bound.
         limit: f64,
     },
-    /// Sizes of two variables, by guesses and bounds, differ by more than 1e8: other units may
-    /// help.
+    /// The magnitudes of two variables, from guesses and bounds, differ by a factor above 1e8;
+    /// rescale them.
     FarUnits {
-        /// The name and the size of the smallest variable.
+        /// The name and the magnitude of the smallest variable.
         small: (&'static str, f64),
-        /// Those of the largest.
+        /// The name and the magnitude of the largest variable.
         large: (&'static str, f64),
     },
 }
@@ -108,12 +110,12 @@ impl fmt::Display for Warning {
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// What may be a mistake: guesses outside of their bounds, by name; constraints that are
-    /// violated at the guess and whose gradient is zero there; ends that its linearisation cannot
-    /// reach; sizes of variables that differ by more than 1e8. It writes the QP at the iterate.
+    /// Returns warnings about likely mistakes: guesses outside their bounds; constraints that are
+    /// violated at the guess and have a vanishing gradient there; unreachable ends; magnitudes of
+    /// variables that differ by a factor above 1e8. Writes the QP at the iterate.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise)
+    /// The errors of [`Ocp::linearise`](crate::ocp::Ocp::linearise)
     pub fn warnings(&mut self) -> Result<Vec<Warning>, OcpError> {
         self.linearise(FirstOrder)?;
         let mut found = Vec::new();
@@ -124,9 +126,9 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         Ok(found)
     }
 
-    /// A warning for each variable, of its worst stage.
+    /// Warns about each variable, at the stage of its largest violation.
     fn warn_guesses_outside_bounds(&self, found: &mut Vec<Warning>) {
-        // Beyond it by most: of every variable, by where it is in a stage.
+        // The largest violation of every variable so far.
         let mut worst: Vec<(QpField, usize, f64, Warning)> = Vec::new();
         let fixed_stages =
             usize::from(matches!(self.initial_state, InitialState::Fixed | InitialState::PartlyFixed));
@@ -160,10 +162,10 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         found.extend(worst.into_iter().map(|(.., warning)| warning));
     }
 
-    /// A warning for each constraint, of its first stage.
+    /// Warns about each constraint, at its first stage.
     fn warn_vanishing_gradients(&self, found: &mut Vec<Warning>) {
         let (qp, (v, _)) = (self.qp(), self.iterate().variables_and_costates());
-        for (place, stage) in Places::<T>::new(qp.dims()).zip(qp.stages()) {
+        for (place, stage) in StageOffsetsIter::<T>::new(qp.dims()).zip(qp.stages()) {
             let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();
             for (i, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
@@ -187,7 +189,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         }
     }
 
-    /// A warning for each bound of the last stage, of states and of terminal constraints.
+    /// Warns about each bound of states and terminal constraints at the last stage.
     fn warn_unreachable_ends(&self, found: &mut Vec<Warning>) {
         let (qp, last, nx) = (self.qp(), self.intervals(), P::Shape::NX);
         let Some(stage) = qp.stage(last) else { return };
@@ -225,8 +227,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         }
     }
 
-    /// A linear function of the last stage at all ends that the linearisation has, if it has one
-    /// alone.
+    /// Returns the value of a linear function of the last stage, if it is the same for all
+    /// solutions of the linearisation.
     fn unique_end_value(&self, coefficients: &[T]) -> Option<T> {
         let (qp, nx) = (self.qp(), P::Shape::NX);
         let (of_states, of_others) = coefficients.split_at_checked(nx)?;
@@ -248,7 +250,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 previous_slopes.iter_mut().zip(row).for_each(|(to, &by)| *to = *to + slope * by);
             }
             for (j, &slope) in previous_slopes.iter().skip(nx).enumerate() {
-                // A control that is given is no way out.
+                // A fixed control cannot change the end.
                 let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, j));
                 if slope.abs() > tolerance * size && lower < upper {
                     return None;
@@ -271,7 +273,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         Some(value)
     }
 
-    /// A warning of the smallest and the largest variable.
+    /// Warns about the smallest and the largest variable.
     fn warn_different_magnitudes(&self, found: &mut Vec<Warning>) {
         let mut sizes: Vec<(&'static str, f64)> = Vec::new();
         let mut add = |name: &'static str, values: &[T]| {
@@ -292,7 +294,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 }
             }
         }
-        // Of what is zero everywhere nothing is known.
+        // Variables that are zero everywhere are ignored.
         let known = || sizes.iter().copied().filter(|(_, size)| *size > 0.0);
         let small = known().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let large = known().reduce(|a, b| if b.1 > a.1 { b } else { a });

@@ -1,29 +1,31 @@
-//! The condensed problem: the recursion over the stages of a block.
+//! The condensed problem, by a recursion over the stages of a block.
 
-use super::plan::{Kind, Origin, blocks, row_bounds_and_penalties};
+use super::plan::{CondensedRow, Kind, blocks, row_bounds_and_penalties};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, PADDING_COLUMNS, Part, Source, product, subtract};
-use crate::qp::layout::{Places, StageDims, StageOffsets, copy_common, padded_len, part, part_mut, take_mut};
+use crate::qp::layout::{
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut, take_mut,
+};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::{Packed, Real, Registers};
 use alloc::vec::Vec;
 
-/// The matrices of the recursion, in one memory.
+/// The matrices of the recursion, in one block of memory.
 pub struct Work<'a, T> {
-    /// `Z`, of the next state, then of `(x, u)`
+    /// `Z` of the next state, and of `(x, u)`
     z: &'a mut [T],
     z_next: &'a mut [T],
-    /// `V`, and its next value
+    /// `V`, and its next value.
     v: &'a mut [T],
     m: &'a mut [T],
     /// `−[A B]ᵀ`
     minus: &'a mut [T],
     /// `−[A B]ᵀ V`
     w: &'a mut [T],
-    /// What is constant in rows of `Z`, or their gradient.
+    /// Constants of the rows of `Z`, and gradients of the rows of controls.
     constant: &'a mut [T],
-    /// Gradient with respect to the next state, and to `(x, u)`
+    /// Gradients with respect to the next state, and to `(x, u)`.
     g: &'a mut [T],
     g_next: &'a mut [T],
     offset: &'a mut [T],
@@ -67,19 +69,19 @@ impl<'a, T: Real> Work<'a, T> {
 pub struct Condense<'a, T> {
     pub qp: QpView<'a, T>,
     pub block: usize,
-    pub rows: &'a [Origin],
+    pub rows: &'a [CondensedRow],
     pub work: Work<'a, T>,
     pub dims: &'a [StageDims],
     pub target: &'a mut [T],
-    /// Room for what the rows of `Z` are.
-    pub origins: &'a mut Vec<Origin>,
+    /// Workspace for the origins of the rows of `Z`.
+    pub origins: &'a mut Vec<CondensedRow>,
 }
 
 impl<T: Real> Registers<T> for Condense<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(mut self) {
         let mut rows = self.rows;
-        let targets = Places::<T>::new(self.dims);
+        let targets = StageOffsetsIter::<T>::new(self.dims);
         for (block, to) in blocks(self.qp.dims.len(), self.block).zip(targets) {
             let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
             rows = others;
@@ -89,15 +91,20 @@ impl<T: Real> Registers<T> for Condense<'_, T> {
 }
 
 impl<T: Real> Condense<'_, T> {
-    /// One block.
+    /// Condenses a block.
     #[inline(always)]
-    fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &StageOffsets, rows: &[Origin]) {
+    fn block<E: Packed<T>>(
+        &mut self,
+        block: core::ops::Range<usize>,
+        to: &StageOffsets,
+        rows: &[CondensedRow],
+    ) {
         let Self { qp, work, target, origins, .. } = self;
         let target = part_mut(target, to.data, to.data_len());
         part_mut(target, 0, to.matrix()).fill(T::ZERO);
         origins.clear();
         let mut controls = 0;
-        let stages = Places::<T>::new(qp.dims).skip(block.start).take(block.len());
+        let stages = StageOffsetsIter::<T>::new(qp.dims).skip(block.start).take(block.len());
         for (count, place) in stages.rev().enumerate() {
             let stage = Stage { place, data: part(qp.data, place.data, place.data_len()), controls };
             work.propagate_stage::<E>(&stage, origins, count == 0);
@@ -118,18 +125,18 @@ impl<T: Real> Condense<'_, T> {
 struct Stage<'s, T> {
     place: StageOffsets,
     data: &'s [T],
-    /// How many controls of later stages there are in the block.
+    /// The number of controls of later stages of the block.
     controls: usize,
 }
 
 impl<T: Real> Work<'_, T> {
-    /// `M`, `Z` and their gradients over the variables of a stage, from those over the state behind
-    /// it; or, at the end of a block, from nothing.
+    /// Computes `M`, `Z` and their gradients over the variables of a stage from those over the next
+    /// state; the last stage of a block starts the recursion.
     #[inline(always)]
     fn propagate_stage<E: Packed<T>>(
         &mut self,
         stage: &Stage<'_, T>,
-        origins: &mut Vec<Origin>,
+        origins: &mut Vec<CondensedRow>,
         first: bool,
     ) {
         let Self { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = self;
@@ -146,9 +153,9 @@ impl<T: Real> Work<'_, T> {
         g_next.iter_mut().zip(linear).for_each(|(g, &linear)| *g = linear);
         let hessian = part(data, place.matrix(), place.hessian());
         if first {
-            // x at the end of the block is A x + B u + b, and costs nothing here.
+            // The state at the end of the block is `A x + B u + b`, and has no cost here.
             for i in 0..next {
-                origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
+                origins.push(CondensedRow { kind: Kind::State, stage: stage + 1, index: i });
                 for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
                     set(z_next, j * ld_z + i, element);
                 }
@@ -157,7 +164,7 @@ impl<T: Real> Work<'_, T> {
             copy_common(part_mut(m, 0, hessian.len()), hessian);
             return;
         }
-        // g + V b, and constants + Z b
+        // `g + V b`, and constants `+ Z b`
         let old = origins.len();
         for (offset, &b) in offset.iter_mut().zip(b) {
             *offset = -b;
@@ -174,10 +181,15 @@ impl<T: Real> Work<'_, T> {
         product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
     }
 
-    /// Writes what belongs to the controls of a stage, which is done: columns of rows, `R` and
-    /// bounds.
+    /// Writes the columns of rows, `R` and bounds of the controls of a stage.
     #[inline(always)]
-    fn write_controls(&self, stage: &Stage<'_, T>, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+    fn write_controls(
+        &self,
+        stage: &Stage<'_, T>,
+        to: &StageOffsets,
+        origins: &[CondensedRow],
+        target: &mut [T],
+    ) {
         let StageOffsets { nx, nu, ld, .. } = stage.place;
         for i in 0..nu {
             let (here, column) =
@@ -201,13 +213,13 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Rows of `Z`: mixed derivatives with respect to the controls of a stage.
+    /// Appends rows to `Z`: mixed derivatives with respect to the controls of a stage.
     #[inline(always)]
-    fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
+    fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<CondensedRow>) {
         let StageOffsets { nx, nu, ld, stage: number, .. } = stage.place;
         for i in 0..nu {
             let row = origins.len();
-            origins.push(Origin { kind: Kind::Control, stage: number, index: stage.controls + i });
+            origins.push(CondensedRow { kind: Kind::Control, stage: number, index: stage.controls + i });
             for j in 0..nx {
                 set(self.z_next, j * self.ld_z + row, get(self.m, j * ld + nx + i));
             }
@@ -215,25 +227,25 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Rows of `Z`: those of the `rows` of a block that are constraints of a stage, with their
+    /// Appends rows to `Z`: the constraints of a stage among the `rows` of a block, with their
     /// bounds.
     #[inline(always)]
     fn add_constraint_rows(
         &mut self,
         stage: &Stage<'_, T>,
-        rows: &[Origin],
+        rows: &[CondensedRow],
         to: &StageOffsets,
-        origins: &mut Vec<Origin>,
+        origins: &mut Vec<CondensedRow>,
         target: &mut [T],
     ) {
         let StageOffsets { nx, n, ld, next, stage: number, .. } = stage.place;
         for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == number) {
             let row = origins.len();
-            origins.push(Origin { index, ..*origin });
+            origins.push(CondensedRow { index, ..*origin });
             let general = origin.index.checked_sub(ld);
             for j in 0..n {
                 let element = match general {
-                    // After `[A B]ᵀ`.
+                    // The constraints follow `[A B]ᵀ`.
                     Some(general) => get(stage.data, (next + general) * ld + j),
                     None if origin.index == j => T::ONE,
                     None => T::ZERO,
@@ -258,7 +270,7 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// What is left is a function of the state of the stage.
+    /// Moves the recursion to the state of the stage.
     #[inline(always)]
     fn shift_to_previous_stage(&mut self, n: usize, nx: usize) {
         let Self { z, z_next, v, m, g, g_next, .. } = self;
@@ -275,13 +287,13 @@ impl<T: Real> Work<'_, T> {
         part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
     }
 
-    /// Writes what belongs to the first state of a block.
+    /// Writes the columns, `Q` and bounds of the first state of a block.
     #[inline(always)]
     fn write_first_state(
         &self,
         stage: &Stage<'_, T>,
         to: &StageOffsets,
-        origins: &[Origin],
+        origins: &[CondensedRow],
         target: &mut [T],
     ) {
         let StageOffsets { nx, ld, .. } = stage.place;
@@ -305,9 +317,9 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// Writes what is constant in the rows of a block.
+    /// Subtracts the constants of the rows of a block from their bounds.
     #[inline(always)]
-    fn write_bound_offsets(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+    fn write_bound_offsets(&self, to: &StageOffsets, origins: &[CondensedRow], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
             let constant = get(self.constant, row);
             match origin.kind {
@@ -325,13 +337,13 @@ impl<T: Real> Work<'_, T> {
     }
 }
 
-/// Where the element of a row of `Z` with a variable of the condensed stage lies.
-fn row_element_index(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
+/// Returns the index of the element of a row of `Z` for a variable of the condensed stage.
+fn row_element_index(to: &StageOffsets, origin: &CondensedRow, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,
-        // Below the diagonal: a later control comes first, so this is its row with states, and its
-        // column with controls.
+        // Below the diagonal: later controls come first, so that this is its row with states, and
+        // its column with controls.
         Kind::Control if variable < to.nx => to.matrix() + variable * to.ld + to.nx + origin.index,
         Kind::Control => to.matrix() + (to.nx + origin.index) * to.ld + variable,
     }

@@ -1,26 +1,26 @@
-//! Between solutions of the problem and of the condensed one.
+//! Conversion between solutions of the original and the condensed problem.
 
-use super::plan::{Origin, blocks};
+use super::plan::{CondensedRow, blocks};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, add_symmetric, add_transposed, subtract, symmetric};
-use crate::qp::layout::{Places, StageOffsets, copy_common, padded_len, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::scalar::{Packed, Real, Registers};
 
 /// Copies variables and multipliers between a solution and that of the condensed problem.
 pub fn copy<T: Real>(
-    (qp, block, rows): (QpView<'_, T>, usize, &[Origin]),
+    (qp, block, rows): (QpView<'_, T>, usize, &[CondensedRow]),
     full: SolutionView<'_, T>,
     condensed: SolutionView<'_, T>,
     expand: bool,
 ) {
     let mut rows = rows;
-    for (block, to) in blocks(qp.dims.len(), block).zip(Places::<T>::new(condensed.dims)) {
+    for (block, to) in blocks(qp.dims.len(), block).zip(StageOffsetsIter::<T>::new(condensed.dims)) {
         let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
         rows = others;
         let mut controls = to.nx + to.nu;
-        for place in Places::<T>::new(qp.dims).skip(block.start).take(block.len()) {
+        for place in StageOffsetsIter::<T>::new(qp.dims).skip(block.start).take(block.len()) {
             controls -= place.nu.min(controls);
             let states = if place.stage == block.start { place.nx } else { 0 };
             let pairs =
@@ -58,12 +58,12 @@ fn copy_either_way<T: Real>(full: &mut [T], a: usize, condensed: &mut [T], b: us
     }
 }
 
-/// The states and multipliers that were eliminated.
+/// Computes the eliminated states and multipliers.
 pub struct Expand<'a, 's, T> {
     pub qp: QpView<'a, T>,
     pub block: usize,
     pub solution: SolutionView<'s, T>,
-    /// Room for a vector over next states and general constraints, and for a gradient.
+    /// Workspace for a vector over next states and general constraints, and for a gradient.
     pub minus: &'a mut [T],
     pub g: &'a mut [T],
 }
@@ -73,7 +73,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { qp, block, solution: SolutionView { v, dynamics, lower, upper, .. }, minus, g } = self;
         let inside = |stage: usize| !stage.is_multiple_of(block) && stage + 1 < qp.dims.len();
-        for place in Places::<T>::new(qp.dims).filter(|place| inside(place.stage + 1)) {
+        for place in StageOffsetsIter::<T>::new(qp.dims).filter(|place| inside(place.stage + 1)) {
             let StageOffsets { n, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let (here, coming) = v.split_at_mut_checked(place.v + ld).unwrap_or_default();
@@ -82,7 +82,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             add_transposed::<T, E>(coming, matrix, part(here, place.v, ld), n, next);
         }
-        for place in Places::<T>::new(qp.dims).rev().filter(|place| inside(place.stage)) {
+        for place in StageOffsetsIter::<T>::new(qp.dims).rev().filter(|place| inside(place.stage)) {
             let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -109,10 +109,11 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
     }
 }
 
-/// `Σ ½ vᵀ H v + hᵀ v`, with room for a vector over the variables of a stage.
+/// Returns `Σ ½ vᵀ H v + hᵀ v`; `product` is the workspace for a vector over the variables of a
+/// stage.
 pub fn stage_cost_and_product<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut [T]) -> f64 {
     let mut sum = 0.0;
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let (v, product) = (part(v, place.v, place.ld), part_mut(product, 0, place.ld));
         product.fill(T::ZERO);

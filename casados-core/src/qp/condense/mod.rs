@@ -1,23 +1,23 @@
-//! Partial condensing: the states inside of blocks of intervals are eliminated.
+//! Partial condensing: elimination of the states inside blocks of intervals.
 //!
 //! A block of stages `k .. k + m` becomes one stage with the state `x_k` and the controls
-//! `(u_{k+m−1}, …, u_k)`, latest first. Bounds of eliminated states become general constraints.
-//! Backwards over the block, with `V` the Hessian of what comes later and `Z` the rows that depend
-//! on `x_{j+1}` (mixed second derivatives, constraints, and `x_{k+m}` itself):
+//! `(u_{k+m−1}, …, u_k)`, latest first. Bounds of eliminated states become general constraints. The
+//! recursion goes backwards over the block, with the Hessian `V` of the cost to go and the rows `Z`
+//! that depend on `x_{j+1}` (mixed second derivatives, constraints, and `x_{k+m}` itself):
 //!
 //! ```text
 //! V ← H_j + [A B]ᵀ V [A B]        Z ← Z [A B]
 //! ```
 //!
-//! Short blocks pay where there are few controls: the Riccati recursion then goes over larger
-//! matrices fewer times, and less memory passes by in each iteration.
+//! Short blocks are faster for problems with few controls: the Riccati recursion has fewer stages
+//! with larger matrices, and less memory traffic per iteration.
 
 mod block;
 mod expand;
 mod plan;
 
 use super::error::QpError;
-use super::layout::{Places, StageDims, padded_len, part};
+use super::layout::{StageDims, StageOffsetsIter, padded_len, part};
 use super::memory::{try_reserve, try_resize};
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
@@ -27,11 +27,11 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use block::{Condense, MaxDimensions, Work};
 use expand::{Expand, copy, stage_cost_and_product};
-use plan::{Kind, Origin, blocks, expand_error, is_bounded, row_bounds_and_penalties};
+use plan::{CondensedRow, Kind, blocks, expand_error, is_bounded, row_bounds_and_penalties};
 
-/// A solver that sees problems condensed in blocks of some intervals.
+/// Condenses problems in blocks of intervals, and solves them by another solver.
 ///
-/// Memory is on the heap, and allocated by the first call and by those with larger problems.
+/// Memory is on the heap; only the first call and calls with larger problems allocate it.
 ///
 /// ```
 /// use casados::qp::{Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
@@ -59,22 +59,22 @@ use plan::{Kind, Origin, blocks, expand_error, is_bounded, row_bounds_and_penalt
 pub struct Condensing<T, S> {
     /// The solver of condensed problems.
     pub solver: S,
-    /// Intervals of a block.
+    /// The number of intervals of a block.
     block: usize,
     qp: Option<(HeapQp<T>, HeapSolution<T>)>,
     dims: Vec<StageDims>,
-    /// The dimensions of the call before.
+    /// The dimensions of the previous call.
     old: Vec<StageDims>,
-    /// Where general constraints come from.
-    rows: Vec<Origin>,
-    /// What the rows of `Z` are.
-    origins: Vec<Origin>,
+    /// The origins of general constraints.
+    rows: Vec<CondensedRow>,
+    /// The origins of the rows of `Z`.
+    origins: Vec<CondensedRow>,
     work: Vec<T>,
 }
 
 impl<T: Real, S> Condensing<T, S> {
-    /// A solver for blocks of `block` intervals. With one interval, or zero, nothing is condensed;
-    /// with as many as there are, or more, one state is left.
+    /// A solver for blocks of `block` intervals. Blocks of zero or one interval are not condensed;
+    /// a block of all intervals or more leaves one state.
     #[must_use]
     pub fn new(block: usize, solver: S) -> Self {
         let (dims, old, rows, origins, work) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -83,16 +83,16 @@ impl<T: Real, S> Condensing<T, S> {
 }
 
 impl<T: Real, S> Condensing<T, S> {
-    /// Dimensions of the condensed problem, and where its general constraints come from, stage by
-    /// stage.
+    /// Computes the dimensions of the condensed problem, and the origins of its general
+    /// constraints, stage by stage.
     fn plan(&mut self, qp: QpView<'_, T>) -> Result<(), QpError> {
         core::mem::swap(&mut self.dims, &mut self.old);
         self.dims.clear();
         self.rows.clear();
-        // As much as there can be, so that no later call needs more.
+        // Reserves the maximum, so that later calls need no more.
         try_reserve(&mut self.dims, qp.dims.len())?;
         try_reserve(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
-        let mut places = Places::<T>::new(qp.dims);
+        let mut places = StageOffsetsIter::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
             for stage in block.clone() {
@@ -106,7 +106,7 @@ impl<T: Real, S> Condensing<T, S> {
                 for index in inner.chain(place.ld..place.ld + place.ng) {
                     if index >= place.ld || is_bounded(row_bounds_and_penalties(data, &place, index)) {
                         condensed.ng += 1;
-                        self.rows.push(Origin { kind: Kind::Constraint, stage, index });
+                        self.rows.push(CondensedRow { kind: Kind::Constraint, stage, index });
                     }
                 }
             }
@@ -149,11 +149,11 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         else {
             return Err(QpError::OutOfMemory { bytes: 0 });
         };
-        let places = Places::<T>::new(qp.dims);
+        let places = StageOffsetsIter::<T>::new(qp.dims);
         let largest = MaxDimensions {
             n: places.clone().map(|p| p.n).max().unwrap_or(0),
             nx: places.clone().map(|p| p.nx).max().unwrap_or(0),
-            rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
+            rows: StageOffsetsIter::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
         };
         let most = places.map(|p| padded_len::<T>(p.next + p.ng)).max().unwrap_or(0);
         let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
@@ -172,8 +172,7 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
         T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });
         result.map_err(|error| expand_error(error, qp, *block, dims, rows)).map(|statistics| {
-            // Penalties are the same; what is constant in eliminated states is in none of the
-            // condensed costs.
+            // Penalties are equal; the condensed costs lack the constants of eliminated states.
             let g = work.get_mut(..padded_len::<T>(largest.n.max(condensed_n))).unwrap_or_default();
             let difference = stage_cost_and_product(qp, solution.v, g)
                 - stage_cost_and_product(condensed.view(), start_and_solution.view_mut().v, g);

@@ -1,18 +1,18 @@
-//! Which stages become one, and what their constraints were before.
+//! The stages of the blocks, and the origins of their constraints.
 
 use crate::qp::error::{QpError, QpField};
-use crate::qp::layout::{Places, StageDims, StageOffsets, part};
+use crate::qp::layout::{StageDims, StageOffsets, StageOffsetsIter, part};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
-/// What a row of `Z` is, or where a constraint of the condensed problem comes from.
+/// The origin of a row of `Z`, or of a constraint of the condensed problem.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Origin {
+pub struct CondensedRow {
     pub kind: Kind,
-    /// The stage it comes from.
+    /// The original stage.
     pub stage: usize,
-    /// A state or control of it, or its row in vectors over constraints.
+    /// The index of a state or control of this stage, or its row in vectors over constraints.
     pub index: usize,
 }
 
@@ -27,7 +27,7 @@ pub enum Kind {
     Constraint,
 }
 
-/// Bounds and penalties of one row.
+/// Returns the bounds and penalties of a row.
 pub fn row_bounds_and_penalties<T: Real>(data: &[T], place: &StageOffsets, row: usize) -> [T; 6] {
     let all = [
         ConstraintVector::Lower,
@@ -42,24 +42,24 @@ pub fn row_bounds_and_penalties<T: Real>(data: &[T], place: &StageOffsets, row: 
     })
 }
 
-/// Whether a row has a bound.
+/// Returns whether a row has a bound.
 pub fn is_bounded<T: Real>([lower, upper, ..]: [T; 6]) -> bool {
     lower.is_finite() || upper.is_finite()
 }
 
-/// The stages of the blocks: all but the last stage in blocks, and the last one by itself.
+/// Returns the stages of the blocks; the last stage is a block by itself.
 pub fn blocks(stages: usize, block: usize) -> impl Iterator<Item = core::ops::Range<usize>> {
     let last = stages.saturating_sub(1);
     (0..last).step_by(block).map(move |k| k..(k + block).min(last)).chain(core::iter::once(last..stages))
 }
 
-/// An error in terms of the problem that was not condensed.
+/// Converts an error of the condensed problem to the original one.
 pub fn expand_error<T: Real>(
     error: QpError,
     qp: QpView<'_, T>,
     size: usize,
     dims: &[StageDims],
-    rows: &[Origin],
+    rows: &[CondensedRow],
 ) -> QpError {
     let find = |stage: usize, field: QpField, index: usize| {
         let range = blocks(qp.dims.len(), size).nth(stage)?;
@@ -67,7 +67,7 @@ pub fn expand_error<T: Real>(
             QpField::GeneralBounds => {
                 let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
                 let origin = rows.get(before + index)?;
-                let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
+                let place = StageOffsetsIter::<T>::new(qp.dims).nth(origin.stage)?;
                 let (field, index) = place.field_of_row(origin.index);
                 Some((origin.stage, field, index))
             }

@@ -2,13 +2,13 @@
 //! Hintermüller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a semismooth Newton
 //! method", SIAM J. Optim. 13, 2002).
 //!
-//! Of a QP that resembles the last one mostly the same bounds are active, and the multipliers tell
-//! which. With these as equations one factorisation solves it; then bounds that are violated become
-//! active, and those that pull cease to be. An interior point, which has to leave the boundary
-//! first, needs several times as many. Where the sets do not settle it is asked all the same, so
-//! that nothing depends on whether they do.
+//! The active set of a QP that resembles the last one is mostly known from the multipliers. One
+//! factorisation solves the QP with these bounds as equations; then violated bounds become active,
+//! and bounds with negative multipliers inactive. An interior point, which must leave the boundary
+//! first, takes several times as many iterations. If the active sets do not settle the interior
+//! point follows, so that the result does not depend on them.
 //!
-//! With the distance `d = σ (c v − bound)`, a weight `W`, and penalties `l e + ½ q e²` of a
+//! With the distance `d = σ (c v − bound)`, a weight `W`, and the penalty `l e + ½ q e²` of a
 //! violation `e`:
 //!
 //! ```text
@@ -29,18 +29,18 @@ use crate::qp::solver::QpStart;
 use crate::qp::statistics::QpStatistics;
 use crate::scalar::{Packed, Real};
 
-/// What a side is, as an element of a list of indices.
+/// The activity of a side.
 const INACTIVE: u32 = 0;
 const ACTIVE: u32 = 1;
 const VIOLATED: u32 = 2;
 
-/// Solves with the same factors, at most.
+/// The maximum number of solves with the same factors.
 const MAX_REFINEMENTS: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
-    /// The solution from a point and its multipliers, if not more than some active sets are between
-    /// them and no pivot vanishes; otherwise what it took to see that. A cold start knows no
-    /// multipliers: it tries the solution without bounds, unless zero violates one.
+    /// Solves the QP by active sets, from a point and its multipliers, in at most `tries` active
+    /// sets. Returns the statistics as an error if the sets do not settle or a pivot vanishes. A
+    /// cold start tries the solution without active bounds, unless the zero point violates one.
     #[inline(always)]
     pub fn by_active_sets<E: Packed<T>>(
         &mut self,
@@ -56,9 +56,9 @@ impl<T: Real> Iterate<'_, T> {
         self.load_point(solution);
         self.load_initial_state();
         self.evaluate_values::<E>();
-        self.sides.load_multipliers(solution);
-        self.sides.guess();
-        if start == QpStart::Cold && (!self.sides.is_active_set_empty() || over()) {
+        self.inequalities.load_multipliers(solution);
+        self.inequalities.guess();
+        if start == QpStart::Cold && (!self.inequalities.is_active_set_empty() || over()) {
             return Err(statistics);
         }
         self.first_gradient::<E>(limits, solution.dynamics);
@@ -76,23 +76,24 @@ impl<T: Real> Iterate<'_, T> {
                 return Err(statistics);
             }
             let before = changes;
-            // Nothing changes sides because of what is below the tolerance.
-            let Terms { forces, values } = limits.of(self.terms);
+            // Violations and multipliers below the tolerance change no side.
+            let Terms { gradient_terms: forces, condition_terms: values } = limits.of(self.terms);
             let half = T::from_f64(0.5);
-            changes = self
-                .sides
-                .update_active_set(Terms { forces: half * forces, values: half * values }, self.measure);
+            changes = self.inequalities.update_active_set(
+                Terms { gradient_terms: half * forces, condition_terms: half * values },
+                self.measure,
+            );
             factor = changes > 0;
             if factor {
-                // Sets that come nearer do not change more and more.
+                // Converging sets have a non-increasing number of changes.
                 if statistics.iterations >= tries || changes > before {
                     return Err(statistics);
                 }
                 continue;
             }
-            self.sides.clip_to_feasible_signs();
+            self.inequalities.clip_to_feasible_signs();
             let objective = self.evaluate::<E>(solution.dynamics);
-            let residuals = self.judged::<E>();
+            let residuals = self.evaluated_residuals::<E>();
             if objective.is_finite() && self.is_converged(residuals, limits) {
                 (statistics.objective, statistics.residuals) =
                     (objective.to_f64(), self.unscaled_residuals(residuals));
@@ -101,31 +102,32 @@ impl<T: Real> Iterate<'_, T> {
             if statistics.refinements >= MAX_REFINEMENTS {
                 return Err(QpStatistics { refinements: 0, ..statistics });
             }
-            self.sides.restore_signed_distances();
+            self.inequalities.restore_signed_distances();
             self.clear_dynamics_residuals();
         }
     }
 
-    /// Newton's step, with the sides as they are; whether there is one.
+    /// Takes a Newton step with the current active set; returns whether it succeeded.
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
-        let weight = T::ONE / self.sides.compliance;
-        self.sides.assemble_active_weights();
+        let weight = T::ONE / self.inequalities.dual_regularisation;
+        self.inequalities.assemble_active_weights();
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;
         }
         for (v, &step) in self.v.iter_mut().zip(&*self.step) {
             *v = *v + step;
         }
-        // A whole step leaves nothing of these.
+        // A full step removes these residuals.
         self.stationarity.fill(T::ZERO);
         self.dynamics.fill(T::ZERO);
         if let Some(coupling) = &mut self.coupling {
             coupling.take_step(T::ONE);
         }
-        let sides = &mut self.sides;
-        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
-        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness) {
+        let sides = &mut self.inequalities;
+        let equations =
+            sides.equations.iter().zip(&mut *sides.equation_multipliers).zip(&mut *sides.equation_residual);
+        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness_scale) {
             *residual = *residual + at(self.step, row);
             *free = *free - weight * stiffness * *residual;
         }
@@ -134,34 +136,35 @@ impl<T: Real> Iterate<'_, T> {
     }
 }
 
-/// Here `slack` is the distance `d`, which may be negative, and `target` the force that the
-/// gradient knows of.
+/// In these functions `slack` is the distance `d`, which may be negative, and `target` the
+/// multiplier that the gradient contains.
 impl<T: Real> Inequalities<'_, T> {
-    /// Whether there are neither active sides nor equations.
+    /// Returns whether there are neither active sides nor equations.
     fn is_active_set_empty(&self) -> bool {
         self.equations.is_empty() && self.activity.iter().all(|&activity| activity == INACTIVE)
     }
 
-    /// `l − q d`, the force of a violated side.
+    /// Returns `l − q d`, the multiplier of a violated side.
     #[inline(always)]
     fn penalty(&self, j: usize, distance: T) -> T {
         at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance
     }
 
-    /// What sides are, from their distances in `scratch` and their multipliers.
+    /// Guesses the active set from distances in `scratch` and multipliers.
     fn guess(&mut self) {
         let count = self.counts.sides();
         copy_common(part_mut(self.slack, 0, count), self.scratch);
         for (((activity, &distance), &multiplier), &softness) in
-            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.softness)
+            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.regularisation_scale)
         {
             *activity = if multiplier * softness > distance { ACTIVE } else { INACTIVE };
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
             let force = self.penalty(j, distance);
-            // Of a violation and the force that its multiplier lacks one is zero.
-            let softness = at(self.softness, side);
+            // The violation and the difference of the penalty's slope and the multiplier are
+            // complementary.
+            let softness = at(self.regularisation_scale, side);
             if distance < T::ZERO && -distance > (force - multiplier) * softness {
                 set(self.activity, side as usize, VIOLATED);
                 set(self.multiplier, side as usize, force);
@@ -175,12 +178,13 @@ impl<T: Real> Inequalities<'_, T> {
         copy_common(part_mut(self.target, 0, count), self.multiplier);
     }
 
-    /// Weights, and into `scratch` what the sides add to the gradient beyond what it knows of.
+    /// Computes weights, and in `scratch` the gradient of the sides beyond what the gradient
+    /// contains.
     #[inline(always)]
     fn assemble_active_weights(&mut self) {
-        let weight = T::ONE / self.compliance;
+        let weight = T::ONE / self.dual_regularisation;
         for ((&activity, side_weight), &softness) in
-            self.activity.iter().zip(&mut *self.weight).zip(&*self.softness)
+            self.activity.iter().zip(&mut *self.weight).zip(&*self.regularisation_scale)
         {
             *side_weight = if activity == ACTIVE { weight / softness } else { T::ZERO };
         }
@@ -195,7 +199,7 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// Distances and multipliers after a step, whose changes of rows are in `scratch`.
+    /// Updates distances and multipliers after a step; `scratch` has the changes of the rows.
     #[inline(always)]
     fn update_after_active_step(&mut self) {
         for (distance, &change) in self.slack.iter_mut().zip(&*self.scratch).take(self.counts.sides()) {
@@ -213,10 +217,10 @@ impl<T: Real> Inequalities<'_, T> {
         copy_common(part_mut(self.target, 0, self.counts.sides()), self.multiplier);
     }
 
-    /// Sides become what their distances and multipliers say. Returns how many have changed.
+    /// Updates the active set by distances and multipliers. Returns the number of changes.
     #[inline(always)]
     fn update_active_set(&mut self, tolerance: Terms<T>, units: Units<'_, T>) -> usize {
-        let Terms { forces, values } = tolerance;
+        let Terms { gradient_terms: forces, condition_terms: values } = tolerance;
         let mut changes = 0;
         let sides = self.activity.iter_mut().zip(&*self.slack).zip(&*self.rows);
         for (((activity, &distance), &row), multiplier) in sides.zip(&mut *self.multiplier) {
@@ -236,7 +240,7 @@ impl<T: Real> Inequalities<'_, T> {
             let unit = self.rows.get(side as usize).map_or(T::ONE, |&row| units.of(row as usize));
             let (forces, values) = (forces * units.objective / unit, values * unit);
             let Some(activity) = self.activity.get_mut(side as usize) else { break };
-            // Without a linear penalty there is nothing between inactive and violated.
+            // Without a linear penalty a side is either inactive or violated.
             let between = linear > T::ZERO;
             match *activity {
                 ACTIVE if !between || multiplier > linear + forces => {
@@ -255,7 +259,7 @@ impl<T: Real> Inequalities<'_, T> {
         changes
     }
 
-    /// Slacks, violations and multipliers as an interior point has them: none is negative.
+    /// Converts to slacks, violations and multipliers of an interior point, which are nonnegative.
     #[inline(always)]
     fn clip_to_feasible_signs(&mut self) {
         let count = self.counts.sides();
@@ -274,7 +278,7 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// Distances again, from the residuals of a settled point.
+    /// Restores signed distances from the residuals of a settled point.
     #[inline(always)]
     fn restore_signed_distances(&mut self) {
         let count = self.counts.sides();

@@ -1,5 +1,5 @@
-//! Newton's equations with parameters `q = (θ, w)`: multipliers of periodic states, and shared
-//! controls.
+//! Newton's equations with the parameters `q = (θ, w)`, a bordered system: multipliers of periodic
+//! states, and shared controls.
 //!
 //! ```text
 //! cost to go of stage k   ½ xᵀPx + xᵀΓq + ½ qᵀSq + pᵀx + sᵀq        Γ_N = (−E, 0)
@@ -7,12 +7,12 @@
 //!                         [ ·    S   ] [q ] = − [s + c]            c = (x₀ − x_N, 0)
 //! ```
 //!
-//! Each parameter is a further right-hand side on the way back, and the way forth is gone once.
-//! They lie side by side, in registers: of `Γ` there is the transpose, a column for each variable.
-//! `E` has a column for each periodic state; a shared control has its columns of `M` at every
-//! stage. Inertia adds up (E. V. Haynsworth, Linear Algebra Appl. 1, 1968): the step is one of a
-//! minimum where pivots of controls and of the border together have as many negative signs as there
-//! are conditions.
+//! Each parameter is a further right-hand side of the backward sweep; there is one forward sweep.
+//! Parameters are stored side by side for SIMD: `Γ` is stored transposed, a column for each
+//! variable. `E` has a column for each periodic state; a shared control has its columns of `M` at
+//! every stage. Inertia is additive (E. V. Haynsworth, Linear Algebra Appl. 1, 1968): the step is
+//! that of a minimum if the pivots of controls and of the border together have as many negative
+//! signs as there are periodicity conditions.
 
 use super::coupling::Coupling;
 use super::kernels::{Columns, Part, Source, product, subtract};
@@ -23,7 +23,7 @@ use super::units::Units;
 use super::vector::{add_scaled, dot, scale_vector};
 use crate::qp::element::{add, set};
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, copy_common, padded_len, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut};
 use crate::qp::{QpView, marked_indices};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -31,7 +31,7 @@ use core::marker::PhantomData;
 /// Solves Newton's equations with the parameters; see [`Riccati::solve`].
 ///
 /// # Errors
-/// [`QpError::NotConvex`] where the inertia is not that of a minimum.
+/// [`QpError::NotConvex`] if the inertia is not that of a minimum.
 pub fn solve<T: Real, E: Packed<T>>(
     coupling: &mut Coupling<'_, T>,
     riccati: &mut Riccati<'_, T>,
@@ -45,7 +45,7 @@ pub fn solve<T: Real, E: Packed<T>>(
     result
 }
 
-/// The solve as a function of its own.
+/// The arguments of [`solve`].
 struct Solve<'s, 'a, 'c, T, E> {
     coupling: &'s mut Coupling<'c, T>,
     riccati: &'s mut Riccati<'a, T>,
@@ -81,15 +81,15 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
 }
 
 impl<T: Real> Coupling<'_, T> {
-    /// All parameters on their way back: their rows of `Γᵀ`, what the elimination of controls
-    /// leaves of `S`, and what residuals of the dynamics add to `s`.
+    /// Sweeps backward over all parameters: computes their rows of `Γᵀ`, the Schur complement `S`,
+    /// and the terms of dynamics residuals in `s`.
     #[inline(always)]
     fn eliminate<E: Packed<T>>(&mut self, qp: QpView<'_, T>, riccati: &Riccati<'_, T>, dynamics: &[T]) {
         let (count, ld) = (self.count, padded_len::<T>(self.count));
         for zero in [&mut *self.schur, self.offset] {
             zero.fill(T::ZERO);
         }
-        for place in Places::<T>::with_known_end(qp.dims, riccati.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(qp.dims, riccati.end).rev() {
             let StageOffsets { nx, nu, n, next, .. } = place;
             let minus = Columns { data: &*self.minus, ld };
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld: place.ld };
@@ -111,8 +111,8 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// Adds what a stage itself has of the parameters: `−E` at the last one, and columns of `M`, of
-    /// so many variables of all stages.
+    /// Adds the terms of the parameters at a stage: `−E` at the last one, and columns of `M`, each
+    /// of `length` elements over all stages.
     #[inline(always)]
     fn add_stage_columns(&mut self, place: &StageOffsets, stages: usize, length: usize) {
         let ld = padded_len::<T>(self.count);
@@ -128,8 +128,8 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// `Y = L⁻¹ Γ_u` of a stage. It leaves `Y` with the signs of pivots where `Γ_u` was, and adds
-    /// what belongs to shared controls to `S`.
+    /// Computes `Y = L⁻¹ Γ_u` of a stage. `Γ_u` is replaced by `Y` with the signs of pivots, and
+    /// the terms of shared controls are added to `S`.
     #[inline(always)]
     fn eliminate_controls(&mut self, place: &StageOffsets, riccati: &Riccati<'_, T>) {
         let (StageOffsets { nx, nu, .. }, ld) = (*place, padded_len::<T>(self.count));
@@ -150,8 +150,8 @@ impl<T: Real> Coupling<'_, T> {
                 add_scaled(below, -factor, signed);
             }
         }
-        // Rows of shared controls were passed by: they belong to `S`, whose other half comes with
-        // the other column. What `M` has of both counts once.
+        // The rows of shared controls were not eliminated: they belong to `S`, whose other half
+        // comes with the other column. Elements of `M` for two shared controls count once.
         for (w, j) in marked_indices(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
             let (other, y) = (self.conditions + w, part_mut(self.eliminated, (begin + j) * ld, ld));
             for (c, &value) in y.iter().enumerate().take(self.count) {
@@ -167,11 +167,11 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// `s`, from what the way back has left.
+    /// Computes `s` from the results of the backward sweep.
     fn gather(&mut self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
         copy_common(self.linear, self.offset);
         let ld = padded_len::<T>(self.count);
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let (begin, nu) = (place.v + place.nx, place.nu);
             let y = part_mut(riccati.y, begin, nu);
             for (w, j) in marked_indices(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
@@ -185,7 +185,7 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// The first state and the changes of the parameters.
+    /// Solves for the first state and the changes of the parameters.
     fn solve_bordered_system(
         &mut self,
         riccati: &Riccati<'_, T>,
@@ -223,8 +223,9 @@ impl<T: Real> Coupling<'_, T> {
         Ok(())
     }
 
-    /// Scales right-hand side and matrix of the border: variables by their units, multipliers of
-    /// periodic states by those of forces. Which pivots vanish is a matter of their sizes.
+    /// Scales right-hand side and matrix of the bordered system: variables by their units,
+    /// multipliers of periodic states by units of multipliers. Vanishing pivots are detected by
+    /// their relative sizes.
     fn scale_bordered_system(&mut self, units: Units<'_, T>, matrix: bool) {
         let (nx, n) = (self.free, self.free + self.count);
         let first = self.first.len();
@@ -251,7 +252,7 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// `[P₀  Γ₀ + E; · S]`, the lower triangle.
+    /// Writes the lower triangle of `[P₀  Γ₀ + E; · S]`.
     fn write_bordered_matrix(&mut self, riccati: &Riccati<'_, T>) {
         let (nx, count) = (self.free, self.count);
         let (n, ld, ld_q) = (nx + count, padded_len::<T>(self.first.len()), padded_len::<T>(count));
@@ -277,12 +278,12 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// What the way forth needs of the first state and the parameters.
+    /// Distributes the first state and the step of the parameters for the forward sweep.
     #[inline(always)]
     fn distribute_parameter_step<E: Packed<T>>(&self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
         let ld = padded_len::<T>(self.count);
         let controls = self.step.get(self.conditions..).unwrap_or_default();
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let begin = place.v + place.nx;
             let y = part_mut(riccati.y, begin, place.nu);
             let own = part(self.eliminated, begin * ld, place.nu * ld).chunks_exact(ld.max(1));
@@ -300,7 +301,7 @@ impl<T: Real> Coupling<'_, T> {
     }
 }
 
-/// The units of the first state, of multipliers of periodic states, and of shared controls.
+/// Returns the units of the first state, of multipliers of periodic states, and of shared controls.
 fn bordered_unknown_units<'a, T: Real>(
     units: Units<'a, T>,
     free: usize,

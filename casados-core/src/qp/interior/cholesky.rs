@@ -1,17 +1,16 @@
 //! The Cholesky factor of the controls of a stage, and substitutions with it.
 //!
-//! Where pivots of either sign are allowed, `M_uu = L S Lᵀ` with signs `S`, which the reciprocals
-//! of pivots have.
+//! With pivots of either sign, `M_uu = L S Lᵀ`, where the reciprocals of pivots have the signs `S`.
 
 use super::kernels::{Columns, Part, Source, chunk, product, splat, subtract, subtract_column};
 use crate::qp::element::set;
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Real};
 
-/// Columns that are taken together: their triangle is in registers.
+/// The number of columns processed together, with their triangle in registers.
 const GROUP: usize = 4;
 
-/// `W` rows of `W` columns of a panel, from a row on, where they are.
+/// Returns `W` rows of `W` columns of a panel, from a row on, by reference.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Option<[&[T; W]; W]> {
@@ -22,8 +21,8 @@ pub fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> 
     Some(core::array::from_fn(|i| unsafe { chunk::<_, W>(panel, row + i * ld) }))
 }
 
-/// `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of pivots,
-/// which their reciprocals have.
+/// Computes `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of
+/// the reciprocals of pivots.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn eliminate<T: Real, E: Packed<T>>(
@@ -55,7 +54,7 @@ pub fn eliminate<T: Real, E: Packed<T>>(
     }
 }
 
-/// The same of `W` columns, and of so many elements of `g`.
+/// As [`eliminate`], for `W` columns and `size` elements of `g`.
 #[inline(always)]
 fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
     g: &mut [T],
@@ -81,7 +80,7 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
     }
 }
 
-/// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
+/// Computes `u = −L⁻ᵀ u`, where `L` starts at row `row` of its panel.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
@@ -95,7 +94,7 @@ pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inve
     }
 }
 
-/// The same of `W` elements.
+/// As [`substitute`], for `W` elements.
 #[inline(always)]
 fn back_substitute_fixed<T: Real, const W: usize>(
     u: &mut [T],
@@ -115,7 +114,7 @@ fn back_substitute_fixed<T: Real, const W: usize>(
     }
 }
 
-/// The same of any number of elements.
+/// As [`substitute`], for any number of elements.
 #[inline(always)]
 fn back_substitute_any<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     for i in (0..u.len()).rev() {
@@ -128,8 +127,8 @@ fn back_substitute_any<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize,
     }
 }
 
-/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before
-/// `index`.
+/// Computes `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables
+/// before `index`.
 pub fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T], index: usize) {
     if let Some(d) = d.get_mut(index) {
         *d = T::ONE;
@@ -143,20 +142,20 @@ pub fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &
     }
 }
 
-/// What is kept of pivots.
+/// The results for the pivots.
 pub struct Pivots<'a, T> {
     pub inverse: &'a mut [T],
     pub added: &'a mut [T],
     /// The largest element of the diagonal.
     pub largest: T,
-    /// Whether negative pivots are pivots like others.
+    /// Whether negative pivots are accepted.
     pub indefinite: bool,
 }
 
-/// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the
-/// other rows of the panel are multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were
-/// replaced by something large: the solution then does not move in their direction. And the first
-/// of them that is negative, which may be rounding, and its index.
+/// Computes the Cholesky factor of a symmetric matrix, whose diagonal starts at row `row` of a
+/// panel; the other rows of the panel are multiplied by `L⁻ᵀ`. Returns the number of vanishing
+/// pivots, which are replaced by large numbers so that the solution has no component in their
+/// direction, and the index and value of the first negative one, which may be a rounding error.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn cholesky<T: Real, E: Packed<T>>(
@@ -178,7 +177,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
     let count = inverse.len();
     let mut begin = 0;
     while begin < count {
-        // Rows of a product begin at a multiple of its width.
+        // Rows of a product start at multiples of its width.
         let width = (count - begin).min(GROUP - (row + begin) % GROUP);
         let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
         if signed {
@@ -203,7 +202,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
             indefinite,
         };
         let found = match width {
-            // Firmware has one copy: flash is dearer than passes over a column.
+            // Firmware has one copy: code size matters more than passes over a column.
             _ if cfg!(not(feature = "std")) => factor_columns::<T, E>(group, width, rows, noise, pivots),
             1 => factor_group::<T, E, 1>(group, rows, noise, pivots),
             2 => factor_group::<T, E, 2>(group, rows, noise, pivots),
@@ -218,14 +217,14 @@ pub fn cholesky<T: Real, E: Packed<T>>(
     (regularised, negative)
 }
 
-/// What is said of the pivots of a group.
+/// The results for the pivots of a group.
 struct PivotReport<T> {
     regularised: usize,
     negative: Option<(usize, T)>,
     signed: bool,
 }
 
-/// The columns of a group, one after the other.
+/// Factorises the columns of a group, one after the other.
 #[inline(always)]
 fn factor_columns<T: Real, E: Packed<T>>(
     (group, ld, first): (&mut [T], usize, usize),
@@ -253,8 +252,8 @@ fn factor_columns<T: Real, E: Packed<T>>(
     all
 }
 
-/// Takes pivot `I` of a block of `W` out of the others. `inverse` is what it was before
-/// elimination, and its reciprocal afterwards.
+/// Eliminates pivot `I` of a block of `W`. `inverse` has the diagonal before elimination, and the
+/// reciprocal of the pivot afterwards.
 #[inline(always)]
 fn eliminate_pivot<T: Real, const W: usize, const I: usize>(
     block: &mut [[T; W]; W],
@@ -269,7 +268,7 @@ fn eliminate_pivot<T: Real, const W: usize, const I: usize>(
     if !is_positive {
         pivot = other_pivot(I, (pivot, before), pivots, found);
     }
-    // The next pivot waits for this quotient, not for a root.
+    // The next pivot depends on this quotient, not on a square root.
     let inverse = T::ONE / pivot;
     set(pivots.inverse, I, inverse);
     for j in I + 1..W {
@@ -280,8 +279,8 @@ fn eliminate_pivot<T: Real, const W: usize, const I: usize>(
     }
 }
 
-/// A pivot that is not positive, with the diagonal before elimination: a negative one where these
-/// are allowed, else something large.
+/// Returns the replacement of a pivot that is not positive; `before` is the diagonal before
+/// elimination. A negative pivot stays if `indefinite`, otherwise it becomes a large number.
 #[cold]
 #[inline(never)]
 fn other_pivot<T: Real>(
@@ -304,9 +303,9 @@ fn other_pivot<T: Real>(
     replaced
 }
 
-/// `W` columns of a panel, of which what is left of them was subtracted: their diagonal block
-/// begins at row `first`. The block is factorised by itself, then all rows are multiplied by its
-/// `L⁻ᵀ` in registers. `inverse` is what the diagonal was before elimination.
+/// Factorises `W` columns of a panel after earlier columns were subtracted: their diagonal block
+/// starts at row `first`. The block is factorised first, then all rows are multiplied by its `L⁻ᵀ`
+/// in registers. `inverse` has the diagonal before elimination.
 #[inline(always)]
 #[allow(unsafe_code)]
 fn factor_group<T: Real, E: Packed<T>, const W: usize>(
@@ -327,7 +326,7 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
         *added = [T::ZERO; W];
     }
     let mut pivots = Pivots { inverse, added, largest, indefinite };
-    // One after the other in straight lines, so that the block stays in registers.
+    // Straight-line code keeps the block in registers.
     eliminate_pivot::<T, W, 0>(&mut block, noise, &mut pivots, &mut found);
     if W > 1 {
         eliminate_pivot::<T, W, 1>(&mut block, noise, &mut pivots, &mut found);
@@ -348,7 +347,7 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
     }
     let mut sizes = *inverse;
     if found.signed {
-        // What is subtracted from the rows has the signs of pivots.
+        // The subtracted rows have the signs of pivots.
         for (column, size) in block.iter_mut().zip(&mut sizes) {
             if *size < T::ZERO {
                 *column = column.map(|l| -l);

@@ -1,18 +1,18 @@
-//! Variables of several stages that are one: periodic states and shared controls.
+//! Couplings of stages: periodic states and shared controls.
 //!
-//! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
-//! parameters of the recursion, `θ` first: see [`border`](super::border).
+//! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. `θ` and the shared controls `w` are
+//! parameters of the recursion, in this order: see [`border`](super::border).
 
 use super::kernels::PADDING_COLUMNS;
 use super::riccati::{Extent, InitialStateKind};
 use super::vector::{add_scaled, scale_vector};
 use crate::qp::element::set;
-use crate::qp::layout::{Places, StageOffsets, first_nx, padded_len, take_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, first_nx, padded_len, take_mut};
 use crate::qp::{QpView, StageDims, marked_indices};
 use crate::scalar::Real;
 
-/// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
-/// that programs that cannot ask for couplings do not contain them.
+/// Proof that couplings are supported. Without the feature `alloc` this type has no value, so that
+/// programs without couplings do not contain their code.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Copy)]
 pub struct CouplingSupport;
@@ -25,17 +25,17 @@ const EXISTS: Option<CouplingSupport> = Some(CouplingSupport);
 #[cfg(not(feature = "alloc"))]
 const EXISTS: Option<CouplingSupport> = None;
 
-/// What couples stages, in memory of its owner.
+/// The data of couplings, in memory of the caller.
 pub struct Coupling<'a, T> {
-    /// For every state of the first stage whether it is periodic.
+    /// A mark for every state of the first stage: whether it is periodic.
     pub periodic: &'a [T],
-    /// For every control of the first stage whether it is shared.
+    /// A mark for every control of the first stage: whether it is shared.
     pub shared: &'a [T],
-    /// How many states are periodic.
+    /// The number of periodic states.
     pub conditions: usize,
-    /// How many parameters there are.
+    /// The number of parameters.
     pub count: usize,
-    /// How many states of the first stage are found with them.
+    /// The number of states of the first stage that are solved for with the parameters.
     pub free: usize,
     /// `x₀ − x_N`
     pub residual: &'a mut [T],
@@ -45,15 +45,15 @@ pub struct Coupling<'a, T> {
     pub step: &'a mut [T],
     /// Columns of `M` of shared controls, over the variables of all stages.
     pub columns: &'a mut [T],
-    /// `S`, the lower triangle. Its columns, and those of the three matrices below, are of one
+    /// `S`, the lower triangle. Its columns, and those of the three matrices below, have the same
     /// padded length: an element for each parameter.
     pub schur: &'a mut [T],
     /// `s`
     pub linear: &'a mut [T],
-    /// `Γᵀ` of the stage at work over all its variables, and `−Γᵀ` of the stage behind it.
+    /// `Γᵀ` of the current stage over all its variables, and `−Γᵀ` of the next stage.
     pub gamma: &'a mut [T],
     pub minus: &'a mut [T],
-    /// `Σ Γ₊ᵀ r`, the part of `s` that residuals of the dynamics have.
+    /// `Σ Γ₊ᵀ r`, the term of dynamics residuals in `s`.
     pub offset: &'a mut [T],
     /// `L⁻¹ M_u·` of all parameters, a column for each variable of all stages.
     pub eliminated: &'a mut [T],
@@ -67,7 +67,7 @@ pub struct Coupling<'a, T> {
 }
 
 impl<'a, T: Real> Coupling<'a, T> {
-    /// How many numbers it takes for so many periodic states and shared controls.
+    /// Returns the length of the memory for these numbers of periodic states and shared controls.
     pub const fn memory(dims: &[StageDims], conditions: usize, shared: usize) -> usize {
         let Extent { n, nx, end, .. } = Extent::of::<T>(dims);
         let count = conditions + shared;
@@ -81,7 +81,7 @@ impl<'a, T: Real> Coupling<'a, T> {
             + border * (border + 2)
     }
 
-    /// That of a QP.
+    /// Returns the length of the memory for a QP.
     pub fn memory_of(qp: QpView<'_, T>) -> usize {
         if EXISTS.is_none() {
             return 0;
@@ -91,7 +91,7 @@ impl<'a, T: Real> Coupling<'a, T> {
         if conditions + shared == 0 { 0 } else { Self::memory(qp.dims, conditions, shared) }
     }
 
-    /// Of a QP that is coupled, in memory of that length.
+    /// The couplings of a QP, in memory of this length.
     pub fn new(
         qp: QpView<'a, T>,
         extent: &Extent,
@@ -131,7 +131,7 @@ impl<'a, T: Real> Coupling<'a, T> {
         })
     }
 
-    /// `x₀ − x_N` at a point over the rows.
+    /// Evaluates `x₀ − x_N` at a point over the rows.
     pub fn evaluate(&mut self, qp: QpView<'_, T>, rows: &[T]) {
         let last = last_state(qp);
         let at = |row: usize| rows.get(row).copied().unwrap_or(T::ZERO);
@@ -140,18 +140,19 @@ impl<'a, T: Real> Coupling<'a, T> {
         }
     }
 
-    /// Goes a part of the step of the multipliers; that of the residuals remains which it leaves.
+    /// Takes the fraction `alpha` of the step of the multipliers; residuals are multiplied by
+    /// `1 − alpha`.
     pub fn take_step(&mut self, alpha: T) {
         add_scaled(self.theta, alpha, self.step);
         scale_vector(self.residual, T::ONE - alpha);
     }
 
-    /// The sum of all `|x₀ − x_N|`.
+    /// Returns the sum of `|x₀ − x_N|`.
     pub fn residual_sum(&self) -> f64 {
         self.residual.iter().fold(0.0, |sum, gap| sum + gap.abs().to_f64())
     }
 
-    /// Adds the forces of `θ`, and of `Δθ` if this is asked for, to the rows.
+    /// Adds the gradient terms of `θ`, with the step of `Δθ` if requested, to the rows.
     pub fn add_multiplier_forces(&self, qp: QpView<'_, T>, with_step: bool, rows: &mut [T]) {
         let last = last_state(qp);
         let multipliers = self.theta.iter().zip(&*self.step).zip(marked_indices(self.periodic));
@@ -165,8 +166,9 @@ impl<'a, T: Real> Coupling<'a, T> {
         }
     }
 
-    /// What is left of a gradient over the rows in variables that are one, at the first stage: the
-    /// sum of its elements in all of them. Elsewhere it is zero then; of states `θ` takes it.
+    /// Replaces a gradient over the rows by that of the coupled variables: the sum over coupled
+    /// elements at the first stage, zero elsewhere. `θ` absorbs the elements of periodic states at
+    /// the last stage.
     pub fn fold(&mut self, qp: QpView<'_, T>, rows: &mut [T]) {
         let mut join = |first: usize, other: usize| {
             let value = rows.get(other).copied().unwrap_or(T::ZERO);
@@ -180,9 +182,10 @@ impl<'a, T: Real> Coupling<'a, T> {
         for (theta, i) in self.theta.iter_mut().zip(marked_indices(self.periodic)) {
             *theta = *theta + join(i, last + i);
         }
-        let Some(first) = Places::<T>::new(qp.dims).next() else { return };
+        let Some(first) = StageOffsetsIter::<T>::new(qp.dims).next() else { return };
         for j in marked_indices(self.shared) {
-            for StageOffsets { row, nx, .. } in Places::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
+            for StageOffsets { row, nx, .. } in
+                StageOffsetsIter::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
             {
                 join(first.nx + j, row + nx + j);
             }
@@ -190,7 +193,7 @@ impl<'a, T: Real> Coupling<'a, T> {
     }
 }
 
-/// Where the last state begins among the rows.
+/// Returns the offset of the last state among the rows.
 fn last_state<T: Real>(qp: QpView<'_, T>) -> usize {
-    Places::<T>::new(qp.dims).next_back().map_or(0, |place| place.row)
+    StageOffsetsIter::<T>::new(qp.dims).next_back().map_or(0, |place| place.row)
 }

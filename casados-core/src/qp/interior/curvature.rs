@@ -1,19 +1,19 @@
-//! Whether a negative pivot is negative curvature, or rounding.
+//! Test whether a negative pivot is negative curvature or a rounding error.
 
 use super::cholesky::{substitute, unit};
 use super::kernels::{Columns, add_transposed, symmetric};
 use super::riccati::Riccati;
 use super::vector::largest_magnitude_ignoring_nan;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut, take_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::Real;
 
 impl<T: Real> Riccati<'_, T> {
-    /// An error if the Hessian curves downwards along the direction in which a pivot is negative:
-    /// that of one control (behind the controls, of a state at the start), with which the ones
-    /// before it and all that come later move such that the rest of `dᵀ M d` vanishes. Otherwise
-    /// the pivot is rounding.
+    /// Returns an error if the Hessian has negative curvature along the direction of a negative
+    /// pivot; otherwise the pivot is a rounding error. The direction has a one in one control (or,
+    /// with an index from `nu` on, in one initial state); earlier pivots and later stages follow
+    /// such that the rest of `dᵀ M d` vanishes.
     pub fn verify(
         &mut self,
         qp: QpView<'_, T>,
@@ -23,7 +23,7 @@ impl<T: Real> Riccati<'_, T> {
     ) -> Result<(), QpError> {
         let (mut curvature, mut size) = (T::ZERO, T::ZERO);
         let mut rest = direction.get_mut(from.row..).unwrap_or_default();
-        for place in Places::<T>::new(qp.dims).skip(from.stage) {
+        for place in StageOffsetsIter::<T>::new(qp.dims).skip(from.stage) {
             let StageOffsets { nx, nu, n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -32,7 +32,7 @@ impl<T: Real> Riccati<'_, T> {
             let v = part_mut(take_mut(&mut rest, place.rows), 0, ld);
             let state = index.checked_sub(nu);
             let (begin, from_here) = (if state.is_some() { 0 } else { nx }, place.stage == from.stage);
-            // The state comes from the stage before.
+            // The state is determined by the stage before.
             let given = if from_here { 0 } else { nx };
             v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
             if from_here {

@@ -1,6 +1,6 @@
-//! Gains `K = M_xu M_uu⁻¹`: `u = −Kᵀ x − M_uu⁻¹ g_u` and `p = g_x − K g_u` are one product each on
-//! the way from stage to stage, where substitutions with the factor would be a chain of roundings
-//! that each wait for the last one. Firmware has no memory for them.
+//! Gains `K = M_xu M_uu⁻¹`: `u = −Kᵀ x − M_uu⁻¹ g_u` and `p = g_x − K g_u` are one product each
+//! from stage to stage. Substitutions with the factor would be a chain of dependent operations.
+//! Firmware has no memory for gains.
 
 use super::cholesky::{eliminate, triangle};
 use super::kernels::{Columns, Source, difference, lanes, splat};
@@ -9,7 +9,7 @@ use crate::qp::layout::{StageOffsets, copy_common, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Riccati<'_, T> {
-    /// The gains of a stage from its factors `(K L; L)`.
+    /// Computes the gains of a stage from its factors `(K L; L)`.
     #[inline(always)]
     pub fn write_gains<E: Packed<T>>(&mut self, place: &StageOffsets) {
         let StageOffsets { nx, nu, ld, .. } = *place;
@@ -36,7 +36,7 @@ impl<T: Real> Riccati<'_, T> {
                 }
                 sum = sum * splat(inverse);
                 if nx - begin < E::LANES {
-                    // Of the factor itself nothing.
+                    // Rows of the factor `L` become zero.
                     sum = E::select(lanes::<T, E>(0, nx - begin), sum, E::from_f64(0.0));
                 }
                 let own = part_mut(own, column * ld + begin, E::LANES);
@@ -47,7 +47,7 @@ impl<T: Real> Riccati<'_, T> {
         }
     }
 
-    /// What the elimination of its controls leaves of the gradient of a stage.
+    /// Returns the gradient of a stage after elimination of its controls.
     #[inline(always)]
     pub fn eliminate_controls<E: Packed<T>>(&mut self, place: &StageOffsets, gradient: &[T]) -> &[T] {
         let StageOffsets { nx, nu, ld, .. } = *place;
@@ -66,7 +66,7 @@ impl<T: Real> Riccati<'_, T> {
     }
 }
 
-/// Those of a few controls, whose factor is in registers.
+/// Computes the gains of `W` controls, whose factor is in registers.
 #[inline(always)]
 fn gains_of_group<T: Real, E: Packed<T>, const W: usize>(
     gains: &mut [T],

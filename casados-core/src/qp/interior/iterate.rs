@@ -1,4 +1,4 @@
-//! One iterate of the interior point, and its residuals.
+//! An iterate of the interior point, and its residuals.
 
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
@@ -8,71 +8,71 @@ use super::terms::{LargestTerms, Terms};
 use super::units::Units;
 use crate::qp::element::get;
 use crate::qp::layout::{
-    Places, StageDims, StageOffsets, copy_common, end, first_nx, padded_len, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, end, first_nx, padded_len, part, part_mut,
+    take_mut,
 };
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
-/// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general
+/// A point, its multipliers and residuals. Vectors over rows have `v` and the values of general
 /// constraints of each stage.
 ///
-/// The residuals of linear conditions are not computed again in every iteration: a step of length
-/// `α` leaves `1 − α` of them. The multipliers of the dynamics are not needed for that, and come
-/// from a recursion at the end.
+/// Residuals of linear conditions are not evaluated in every iteration: a step of length `α` leaves
+/// `1 − α` of them. This does not require the multipliers of the dynamics, which a recursion
+/// computes at the end.
 pub struct Iterate<'a, T> {
     pub qp: QpView<'a, T>,
     pub first: InitialStateKind,
-    /// Whether there is one: without it a point is sought that violates least.
+    /// Whether the objective counts; without it the violation is minimised.
     pub objective: bool,
-    /// What keeps variables near where they are: `½ ρ |Δ|²` of every step.
+    /// The weight `ρ` of the proximal term `½ ρ |Δ|²` of every step.
     pub proximal: T,
-    /// The units that `Δ` is measured in there, by rows; all one if there are none.
+    /// The units of `Δ` in the proximal term, by rows; empty if all are one.
     pub units: &'a [T],
-    /// What everything else is compared with.
+    /// The units of residuals.
     pub measure: Units<'a, T>,
     pub riccati: Riccati<'a, T>,
-    pub sides: Inequalities<'a, T>,
-    /// What couples stages.
+    pub inequalities: Inequalities<'a, T>,
+    /// Couplings of stages.
     pub coupling: Option<Coupling<'a, T>>,
     /// `v` and `C x + D u`
     pub v: &'a mut [T],
     /// `Δ`
     pub step: &'a mut [T],
-    /// Gradient of the Lagrangian.
+    /// The gradient of the Lagrangian.
     pub stationarity: &'a mut [T],
-    /// Right-hand side of Newton's equations.
+    /// The right-hand side of Newton's equations.
     pub gradient: &'a mut [T],
     /// Weights of rows.
     pub weights: &'a mut [T],
     /// `A x + B u + b − x₊`
     pub dynamics: &'a mut [T],
-    /// The multiplier of a given state at the start.
+    /// The multiplier of a fixed initial state.
     pub initial: &'a mut [T],
     /// `Σ s λ` over the number of pairs.
     pub mu: T,
-    /// The largest terms of the residuals when they were computed last, in units.
+    /// The largest terms of the residuals at their last evaluation, in units.
     pub terms: Terms<T>,
-    /// The same as they are.
+    /// The same terms without units.
     pub own_terms: Terms<T>,
 }
 
-/// Where the multipliers `π` of the dynamics come from when a gradient is computed.
+/// The origin of the multipliers `π` of the dynamics in the evaluation of a gradient.
 #[derive(Clone, Copy)]
 pub enum Costates {
-    /// The adjoint recursion of the controlled system, `(A + B K)ᵀ` in place of `Aᵀ`, with the
-    /// feedback `K` of the last factors: `Kᵀ` times the gradient in the controls is added, which
-    /// vanishes at the solution. Errors decay where the recursion of the dynamics alone lets them
-    /// grow. Without factors it is that one.
+    /// The adjoint recursion of the closed-loop system, with `(A + B K)ᵀ` in place of `Aᵀ` and the
+    /// feedback `K` of the last factors. It adds `Kᵀ` times the gradient by the controls, which
+    /// vanishes at the solution. Errors decay even if the dynamics are unstable. Without factors it
+    /// is the open-loop recursion.
     Controlled,
-    /// The same after a step, with the changes of multipliers of periodic states.
+    /// As `Controlled` after a step, with the changes of multipliers of periodic states.
     AfterStep,
-    /// They are given. Newton's step does not depend on them.
+    /// Given multipliers. The Newton step does not depend on them.
     Given,
 }
 
-/// The residuals as a function of its own; the gradient only where there is room for multipliers
-/// and the objective.
+/// The arguments of the evaluation of residuals; the gradient is evaluated only with `multipliers`.
 struct EvaluateResiduals<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
     values: bool,
@@ -94,18 +94,18 @@ impl<T: Real, E: Packed<T>> Piece for EvaluateResiduals<'_, '_, T, E> {
 }
 
 impl<'a, T: Real> Iterate<'a, T> {
-    /// How many numbers it takes.
+    /// Returns the length of the memory.
     pub const fn memory(dims: &[StageDims], counts: &Counts) -> usize {
         let end = end::<T>(dims);
-        Riccati::<T>::memory(dims) + counts.numbers() + 5 * end.row + end.dynamics + first_nx(dims)
+        Riccati::<T>::memory(dims) + counts.memory_len() + 5 * end.row + end.dynamics + first_nx(dims)
     }
 
-    /// How many numbers it takes for a QP.
+    /// Returns the length of the memory for a QP.
     pub fn memory_of(qp: QpView<'_, T>, counts: &Counts) -> usize {
         Self::memory(qp.dims, counts) + Coupling::memory_of(qp)
     }
 
-    /// In memory that is zero.
+    /// An iterate in memory that is zero.
     pub fn new(
         qp: QpView<'a, T>,
         extent: &Extent,
@@ -127,7 +127,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             units: &[],
             measure: Units::NONE,
             riccati,
-            sides,
+            inequalities: sides,
             v: take_mut(numbers, end.row),
             step: take_mut(numbers, end.row),
             stationarity: take_mut(numbers, end.row),
@@ -136,52 +136,51 @@ impl<'a, T: Real> Iterate<'a, T> {
             dynamics: take_mut(numbers, end.dynamics),
             initial: take_mut(numbers, if first == InitialStateKind::Fixed { initial } else { 0 }),
             mu: T::ZERO,
-            terms: Terms { forces: T::ZERO, values: T::ZERO },
-            own_terms: Terms { forces: T::ZERO, values: T::ZERO },
+            terms: Terms { gradient_terms: T::ZERO, condition_terms: T::ZERO },
+            own_terms: Terms { gradient_terms: T::ZERO, condition_terms: T::ZERO },
         }
     }
 
-    /// What sides and equations give way to forces, and variables if they are to, in the units of
-    /// the problem.
+    /// Sets the dual regularisation `δ` and, if requested, the proximal weight, in the units of the
+    /// problem.
     pub fn set_regularisation(&mut self, proximal: bool) {
-        let Terms { forces, values } = self.terms;
+        let Terms { gradient_terms: forces, condition_terms: values } = self.terms;
         let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
-        self.sides.compliance = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
+        self.inequalities.dual_regularisation = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
         let stiffness = self.measure.objective * stiffness.max(T::from_f64(1e-4));
         self.proximal = if proximal { small * stiffness } else { T::ZERO };
     }
 
-    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` by
-    /// the recursion of the controlled system, and the gradient of the Lagrangian. Returns the
-    /// objective.
+    /// Evaluates all residuals at the point: general constraints, dynamics, the multipliers `π` by
+    /// the closed-loop recursion, and the gradient of the Lagrangian. Returns the objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
         self.evaluate_selected::<E>(true, Some(multipliers), Costates::Controlled)
     }
 
-    /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is
-    /// what they leave.
+    /// As [`evaluate`](Self::evaluate), with given multipliers `π`, whose residuals are the
+    /// gradient by the states.
     pub fn evaluate_with_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_selected::<E>(true, Some(multipliers), Costates::Given);
     }
 
-    /// The multipliers `π` after a step, by the recursion of the controlled system.
+    /// Computes the multipliers `π` after a step, by the closed-loop recursion.
     pub fn closed_loop_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::AfterStep);
     }
 
-    /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are
-    /// in `scratch` afterwards.
+    /// Evaluates general constraints, dynamics, and residuals of the sides; leaves the distances
+    /// from the bounds in `scratch`.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
         let _ = self.evaluate_selected::<E>(true, None, Costates::Given);
     }
 
-    /// What is left of [`evaluate`](Self::evaluate) after
+    /// Evaluates the rest of [`evaluate`](Self::evaluate) after
     /// [`evaluate_values`](Self::evaluate_values).
     pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::Controlled);
     }
 
-    /// The same with given multipliers.
+    /// As [`evaluate_gradient`](Self::evaluate_gradient), with given multipliers `π`.
     pub fn gradient_with_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::Given);
     }
@@ -199,20 +198,20 @@ impl<'a, T: Real> Iterate<'a, T> {
         objective
     }
 
-    /// Forces of the constraints, by rows.
+    /// Writes the gradient terms of the constraints, by rows.
     #[inline(always)]
     fn write_forces(&mut self, after_step: bool) {
-        let sides = &mut self.sides;
+        let sides = &mut self.inequalities;
         let forces = &mut *self.gradient;
         forces.fill(T::ZERO);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
         let (of_lower, of_upper) = sides.multiplier.split_at_checked(lower.len()).unwrap_or_default();
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
-        scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
+        scatter(forces, sides.equations, sides.equation_multipliers, |force, &multiplier| force - multiplier);
         if after_step {
-            // What keeps variables near where they are belongs to the step, not to the problem.
-            for place in Places::<T>::new(self.qp.dims) {
+            // The proximal term belongs to the step, not to the problem.
+            for place in StageOffsetsIter::<T>::new(self.qp.dims) {
                 let step = part(self.step, place.row, place.n);
                 let forces = part_mut(forces, place.row, place.n);
                 for (i, (force, &step)) in forces.iter_mut().zip(step).enumerate() {
@@ -225,7 +224,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
     }
 
-    /// The multipliers `π`, the gradient of the Lagrangian, and the objective.
+    /// Computes the multipliers `π` and the gradient of the Lagrangian; returns the objective.
     #[inline(always)]
     fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
         let after_step = matches!(costates, Costates::AfterStep);
@@ -234,7 +233,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut objective = T::ZERO;
         let mut largest = LargestTerms::NONE;
         largest.add_forces::<E>(self.gradient, units.rows);
-        for place in Places::<T>::with_known_end(self.qp.dims, self.riccati.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(self.qp.dims, self.riccati.end).rev() {
             let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -273,7 +272,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 }
                 largest.add_forces::<E>(pi, here);
             } else if place.stage > 0 {
-                // π is what elimination of the controls leaves, g what it takes.
+                // `π` is the gradient after elimination of the controls, `g` the remainder.
                 let left = self.riccati.eliminate_controls::<E>(&place, g);
                 let before = place.dynamics.saturating_sub(padded_len::<T>(nx));
                 let pi = part_mut(multipliers, before, nx);
@@ -283,25 +282,26 @@ impl<'a, T: Real> Iterate<'a, T> {
                 }
                 largest.add_forces::<E>(pi, here);
             } else if self.first == InitialStateKind::Fixed {
-                // What is left is the multiplier of the given state.
+                // The remainder is the multiplier of the fixed initial state.
                 let given = part_mut(g, 0, nx);
                 copy_common(part_mut(self.initial, 0, nx), given);
-                // Zero, or NaN where it is not finite: that is seen among the residuals.
+                // Zero, or NaN if it is not finite, which the residuals then show.
                 given.iter_mut().for_each(|g| *g = T::ZERO * *g);
             }
         }
         if let Some(coupling) = self.coupling.as_mut().filter(|_| !after_step) {
             coupling.fold(self.qp, self.stationarity);
             if self.first == InitialStateKind::Fixed {
-                // What the last state pushes a given first one with belongs to its multiplier, too.
+                // The coupling term of the last state at a fixed first state belongs to its
+                // multiplier, too.
                 for (force, g) in self.initial.iter_mut().zip(&mut *self.stationarity) {
                     *force = *force + *g;
                     *g = T::ZERO * *g;
                 }
             }
         }
-        self.own_terms.forces = largest.own;
-        self.terms.forces = units.choose(largest.own, largest.in_units / units.objective);
+        self.own_terms.gradient_terms = largest.own;
+        self.terms.gradient_terms = units.choose(largest.own, largest.in_units / units.objective);
         objective + self.penalty_cost()
     }
 
@@ -310,7 +310,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let units = self.measure;
         let mut largest = LargestTerms::NONE;
         let mut rest = &mut *self.v;
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             let StageOffsets { n, ng, ld, next, ld_next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -328,19 +328,19 @@ impl<'a, T: Real> Iterate<'a, T> {
             }
             add_transposed::<T, E>(dynamics, matrix, v, n, next);
         }
-        self.own_terms.values = largest.own;
-        self.terms.values = units.choose(largest.own, largest.in_units);
+        self.own_terms.condition_terms = largest.own;
+        self.terms.condition_terms = units.choose(largest.own, largest.in_units);
         if let Some(coupling) = &mut self.coupling {
             coupling.evaluate(self.qp, self.v);
         }
         self.evaluate_side_residuals::<E>();
     }
 
-    /// What belongs to sides, of values that are known.
+    /// Evaluates the residuals of the sides from the values of the rows.
     #[inline(always)]
     pub fn evaluate_side_residuals<E: Packed<T>>(&mut self) {
         self.evaluate_distances();
-        let sides = &mut self.sides;
+        let sides = &mut self.inequalities;
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
         {
             *residual = value - slack;
@@ -360,14 +360,14 @@ impl<'a, T: Real> Iterate<'a, T> {
     }
 
     fn penalty_cost(&self) -> T {
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
         let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
         costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
     }
 }
 
-/// What a proximal weight is of a row, whose variable is measured in its unit.
+/// Returns the proximal weight of a row, whose variable has a unit.
 #[inline(always)]
 pub fn scaled_proximal_weight<T: Real>(proximal: T, units: &[T], row: usize) -> T {
     units.get(row).map_or(proximal, |&unit| proximal / (unit * unit))
@@ -380,7 +380,7 @@ pub fn at<T: Real>(slice: &[T], index: u32) -> T {
     get(slice, index as usize)
 }
 
-/// Changes rows by values that belong to them.
+/// Changes the rows of `target` by these values.
 #[inline(always)]
 pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
     for (&row, value) in rows.iter().zip(values) {

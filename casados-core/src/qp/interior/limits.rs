@@ -1,4 +1,4 @@
-//! What residuals are to be below.
+//! Tolerances of residuals.
 
 use super::iterate::Iterate;
 use super::options::InteriorPointOptions;
@@ -8,67 +8,68 @@ use super::terms::Terms;
 use super::units::Units;
 use crate::scalar::Real;
 
-/// Residuals as they are are to be below so many `ε` of their terms.
+/// Residuals without units must be below this multiple of `ε` times their terms.
 const ROUNDING_FACTOR: f64 = 1e6;
-/// The part of the tolerance that residuals in units are to be below.
+/// The fraction of the tolerance for residuals in units, which are estimates.
 const SCALED_TOLERANCE_FACTOR: f64 = 0.1;
 
-/// What residuals are to be below.
+/// Tolerances of residuals.
 pub struct ResidualTolerances<T> {
     absolute: Terms<T>,
     pub relative: T,
-    /// The part of the tolerance that `absolute` is.
+    /// The fraction of the tolerance in `absolute`.
     share: T,
 }
 
 impl<T: Real> ResidualTolerances<T> {
-    /// At least a tolerance that is asked for.
+    /// The tolerances of the options, at least `relaxed`.
     pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: PenaltyMode, scaled: bool) -> Self {
         let values = T::from_f64(options.tolerance).max(relaxed);
-        // What multipliers are to prove depends on how well gradients vanish.
+        // A certificate of infeasibility requires small gradients.
         let share = if penalties == PenaltyMode::Hard { 0.01 } else { 1.0 };
         // Units are estimates.
         let in_units = if scaled { T::from_f64(SCALED_TOLERANCE_FACTOR) } else { T::ONE };
         let values = values * in_units;
-        let absolute = Terms { forces: values * T::from_f64(share), values };
+        let absolute = Terms { gradient_terms: values * T::from_f64(share), condition_terms: values };
         Self { absolute, relative: T::from_f64(options.relative_tolerance), share: in_units }
     }
 
-    /// Whether residuals as they are are small beside their terms; those of complementarity are
-    /// products of forces and values.
+    /// Returns whether residuals without units are small relative to their terms; the terms of
+    /// complementarity are products of gradient terms and values.
     pub fn satisfied_relative_to_terms(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
         let relative = self.relative.max(T::from_f64((ROUNDING_FACTOR * T::EPSILON).min(1e-5)));
-        let products = (relative * terms.forces * terms.values).max(self.absolute.forces);
+        let products =
+            (relative * terms.gradient_terms * terms.condition_terms).max(self.absolute.gradient_terms);
         let others = MaxResiduals { complementarity: T::ZERO, ..residuals };
         residuals.complementarity <= products && Self { relative, ..*self }.satisfied_by(others, terms)
     }
 
-    /// Whether residuals in the units of the user are below the whole tolerance.
+    /// Returns whether residuals without units are below the whole tolerance.
     fn satisfied_unscaled(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
-        let Terms { forces, values } = self.absolute;
-        let absolute = Terms { forces: forces / self.share, values: values / self.share };
+        let Terms { gradient_terms: forces, condition_terms: values } = self.absolute;
+        let absolute = Terms { gradient_terms: forces / self.share, condition_terms: values / self.share };
         Self { absolute, ..*self }.satisfied_by(residuals, terms)
     }
 
-    /// Of residuals with such terms.
+    /// Returns the tolerances of residuals with these terms.
     pub fn of(&self, terms: Terms<T>) -> Terms<T> {
         Terms {
-            forces: (self.relative * terms.forces).max(self.absolute.forces),
-            values: (self.relative * terms.values).max(self.absolute.values),
+            gradient_terms: (self.relative * terms.gradient_terms).max(self.absolute.gradient_terms),
+            condition_terms: (self.relative * terms.condition_terms).max(self.absolute.condition_terms),
         }
     }
 
-    /// Whether residuals with such terms are small.
+    /// Returns whether residuals with these terms are below the tolerances.
     pub fn satisfied_by(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
         let MaxResiduals { stationarity, dynamics, inequalities, complementarity } = residuals;
-        let Terms { forces, values } = self.of(terms);
+        let Terms { gradient_terms: forces, condition_terms: values } = self.of(terms);
         stationarity <= forces && complementarity <= forces && dynamics <= values && inequalities <= values
     }
 }
 
 impl<T: Real> Iterate<'_, T> {
-    /// Whether residuals are small that were [`judged`](Self::judged): in units, and as they are
-    /// beside their terms.
+    /// Returns whether the [`judged`](Self::judged) residuals are small, both in units and, without
+    /// units, relative to their terms.
     #[inline(always)]
     pub fn is_converged(&self, judged: MaxResiduals<T>, limits: &ResidualTolerances<T>) -> bool {
         limits.satisfied_by(judged, self.terms)
@@ -77,7 +78,7 @@ impl<T: Real> Iterate<'_, T> {
                     .satisfied_relative_to_terms(self.residuals_in_units::<T>(Units::NONE), self.own_terms))
     }
 
-    /// Whether residuals are below the tolerance in the units of the user: enough where no step
+    /// Returns whether residuals without units are below the tolerance, which suffices if no step
     /// makes progress.
     pub fn is_converged_unscaled(&self, limits: &ResidualTolerances<T>) -> bool {
         !self.measure.rows.is_empty()

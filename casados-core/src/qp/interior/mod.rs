@@ -1,5 +1,5 @@
-//! The library's own solver: a primal-dual interior point with Mehrotra's predictor and corrector,
-//! whose linear systems are solved by a Riccati recursion.
+//! The primal-dual interior point with Mehrotra's predictor-corrector, whose linear systems are
+//! solved by a Riccati recursion.
 
 mod active;
 mod border;
@@ -35,7 +35,9 @@ pub(crate) use kernels::{
 pub(super) use kernels::{PADDING_COLUMNS, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub(crate) use riccati::{Extent, InitialStateKind};
-pub(crate) use sides::{Counts, Inequalities, PenaltyMode, Reading, count, is_initial_state_fixed};
+pub(crate) use sides::{
+    ConstraintInterpretation, Counts, Inequalities, PenaltyMode, count, is_initial_state_fixed,
+};
 pub use store::Store;
 #[cfg(feature = "alloc")]
 pub(crate) use symmetric::Symmetric;
@@ -57,22 +59,22 @@ use limits::ResidualTolerances;
 use run::{Attempt, Run, Runs};
 use units::Units;
 
-/// An interior point that exploits the structure of optimal control.
+/// A primal-dual interior point that exploits the structure of optimal control.
 ///
 /// Each iteration costs one Riccati factorisation, `O(N (nx + nu)³)`, and two solves. With the
-/// feature `alloc` its memory is on the heap, and is allocated by the first call and by calls with
-/// larger problems only. Elsewhere see [`InteriorPoint::in_memory`].
+/// feature `alloc` its memory is on the heap; only the first call and calls with larger problems
+/// allocate. Otherwise see [`InteriorPoint::in_memory`].
 ///
-/// A warm start first takes the bounds with multipliers for the active ones, and corrects this set
-/// by semismooth Newton steps (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as
-/// a semismooth Newton method", SIAM J. Optim. 13, 2002): for a problem like the last one a single
-/// factorisation is enough. Where [`active_sets`](InteriorPointOptions::active_sets) of them are
-/// not, the interior point follows. A cold start first tries the solution without bounds, unless
-/// zero violates one.
+/// A warm start first takes the bounds with multipliers as the active set, and corrects the set by
+/// semismooth Newton steps (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as a
+/// semismooth Newton method", SIAM J. Optim. 13, 2002): a QP similar to the last one takes a single
+/// factorisation. After [`active_sets`](InteriorPointOptions::active_sets) unsuccessful sets the
+/// interior point follows. A cold start first tries the solution without active bounds, unless the
+/// zero point violates one.
 ///
-/// Multipliers of an infeasible problem grow in the direction of a proof that no point satisfies
-/// all constraints (Farkas' lemma). Where they are near it, the problem is solved once more with
-/// all bounds soft: that finds the violated bounds, and its multipliers are the proof.
+/// The multipliers of an infeasible problem grow in the direction of a certificate of infeasibility
+/// (Farkas' lemma). If they are close to one, the problem is solved again with all bounds soft:
+/// this locates the violated bounds, and its multipliers are the certificate.
 ///
 /// ```
 /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
@@ -99,9 +101,9 @@ use units::Units;
 pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
     pub options: InteriorPointOptions,
-    /// A tolerance above that of the options is asked for.
-    relaxed: T,
-    /// The iterations of a call, where the caller has ways out of its own.
+    /// The permitted residual, if it is above the tolerance of the options.
+    permitted_residual: T,
+    /// The limit of iterations per call, set by [`QpSolver::limit`].
     limit: Option<usize>,
     numbers: N,
     indices: I,
@@ -136,7 +138,7 @@ pub type HeapInteriorPoint<T = f64> = InteriorPoint<T, Vec<T>, Vec<u32>>;
 
 #[cfg(feature = "alloc")]
 impl<T: Real> HeapInteriorPoint<T> {
-    /// A solver without memory: the first call allocates it.
+    /// A solver without memory, which the first call allocates.
     #[must_use]
     pub fn new() -> Self {
         Self::in_memory(Vec::new(), Vec::new())
@@ -151,12 +153,12 @@ impl<T: Real> Default for HeapInteriorPoint<T> {
 }
 
 impl<T: Real, N, I> InteriorPoint<T, N, I> {
-    /// How many numbers and indices the solver takes for a problem with so many finite bounds (each
-    /// side for itself), soft ones among them, and equations (pairs of equal hard bounds) beside
-    /// the state at the start.
+    /// Returns the numbers of elements and indices in the memory for a problem with these numbers
+    /// of finite bounds (lower and upper bounds counted separately), soft bounds among them, and
+    /// equations (pairs of equal hard bounds) except the fixed initial state.
     ///
-    /// To locate what makes a problem infeasible it takes as much as if all were soft. Periodic
-    /// states and shared controls, for which the feature `alloc` is needed, take
+    /// Locating the constraints that make a problem infeasible requires the memory for all bounds
+    /// soft. Periodic states and shared controls, which require the feature `alloc`, take
     /// [`InteriorPoint::memory_of_coupling`] more.
     #[must_use]
     pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
@@ -169,7 +171,7 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
 }
 
 impl<T: Real, N, I> InteriorPoint<T, N, I> {
-    /// How many numbers more it takes for so many periodic states and shared controls.
+    /// Returns the additional length for these numbers of periodic states and shared controls.
     #[must_use]
     pub const fn memory_of_coupling(dims: &[StageDims], periodic: usize, shared: usize) -> usize {
         if exceeds_memory(dims) {
@@ -180,11 +182,11 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
 }
 
 impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
-    /// A solver in given memory, of the lengths that [`InteriorPoint::memory`] tells.
+    /// A solver in given memory, of the lengths by [`InteriorPoint::memory`].
     pub fn in_memory(numbers: N, indices: I) -> Self {
         Self {
             options: InteriorPointOptions::new::<T>(),
-            relaxed: T::ZERO,
+            permitted_residual: T::ZERO,
             limit: None,
             numbers,
             indices,
@@ -192,7 +194,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         }
     }
 
-    /// One run of the method, and whether it has proved that no point satisfies all constraints.
+    /// Runs the method once; also returns whether the multipliers are a certificate of
+    /// infeasibility, or, with the objective, suspected to be one.
     fn run(
         &mut self,
         qp: QpView<'_, T>,
@@ -214,16 +217,20 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         (result, infeasible): (&mut Result<QpStatistics, QpError>, &mut bool),
     ) -> Result<(), QpError> {
         let no_bound = T::from_f64(self.options.no_bound);
-        let reading = Reading { fixed: is_initial_state_fixed(qp), penalties: attempt.penalties, no_bound };
+        let reading = ConstraintInterpretation {
+            fixed: is_initial_state_fixed(qp),
+            penalties: attempt.penalties,
+            no_bound,
+        };
         let counts = count(qp, &reading);
         let extent = Extent::of::<T>(qp.dims);
         let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
         let numbers = self.numbers.at_least(length, QpField::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
-        // Those of sides are of any length: behind the others, all of which are whole registers.
+        // Arrays of inequalities have any length: they follow the arrays of whole registers.
         let (mut numbers, mut inequality_numbers) =
-            numbers.split_at_mut_checked(length - counts.numbers()).unwrap_or_default();
+            numbers.split_at_mut_checked(length - counts.memory_len()).unwrap_or_default();
         let mut sides = Inequalities::new(counts, &mut inequality_numbers, &mut indices);
         sides.list(qp, &reading);
         let given = attempt.penalties == PenaltyMode::Given;
@@ -237,7 +244,12 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if reading.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
-        let limits = ResidualTolerances::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
+        let limits = ResidualTolerances::new(
+            &self.options,
+            self.permitted_residual,
+            attempt.penalties,
+            found.is_some(),
+        );
         T::run_precompiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -252,8 +264,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         Ok(())
     }
 
-    /// Other attempts at a problem that the first did not solve, and the reason if there is no
-    /// solution.
+    /// Tries to solve a problem again after a failed first attempt, or returns the final error.
     fn retry(
         &mut self,
         qp: QpView<'_, T>,
@@ -338,7 +349,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         };
         let (result, suspected) = self.run(qp, attempt, over, &mut solution);
         let Err(error) = result else { return result };
-        // A number that is not finite is found here, not in every call.
+        // Non-finite data is detected after a failure only, not in every call.
         super::check::check(qp)?;
         if self.limit.is_none() {
             return self.retry(qp, start, error, over, &mut solution);
@@ -353,6 +364,6 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
     }
 
     fn permit(&mut self, tolerance: f64) {
-        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
+        self.permitted_residual = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }

@@ -1,4 +1,4 @@
-//! What a user can choose.
+//! Options of the interior point.
 
 use crate::qp::error::QpError;
 use crate::scalar::Real;
@@ -26,46 +26,45 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InteriorPointOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below this, or below
-    /// `relative_tolerance`. Default 1e-8; of single precision 1e-4.
+    /// The tolerance of each of the four [`Residuals`](crate::qp::Residuals); `relative_tolerance`
+    /// may allow more. Default 1e-8; in single precision 1e-4.
     pub tolerance: f64,
-    /// Residuals may be this part of the largest of the terms whose sums they are: stationarity and
-    /// complementarity of `H v`, `h`, forces of constraints and multipliers `π`; dynamics and
-    /// inequalities of `v`, values of general constraints and `b`. What is asked for is the larger
-    /// one of this and `tolerance`. Default 0, absolute; of single precision, where terms have no
-    /// more than seven digits, 1e-5.
+    /// The tolerance of residuals relative to the largest of their terms: for stationarity and
+    /// complementarity `H v`, `h`, gradients of constraints and multipliers `π`; for dynamics and
+    /// inequalities `v`, values of general constraints and `b`. The larger of this and `tolerance`
+    /// holds. Default 0; in single precision, whose terms have seven digits, 1e-5.
     pub relative_tolerance: f64,
-    /// After so many iterations, attempts at a warm start among them, there is no solution:
-    /// [`QpError::MaxIterations`](crate::qp::QpError::MaxIterations). With zero the start has to be
-    /// one. Default 50.
+    /// The maximum number of iterations, including active sets of a warm start; then the error is
+    /// [`QpError::MaxIterations`](crate::qp::QpError::MaxIterations). With zero the start must be a
+    /// solution. Default 50.
     pub max_iterations: usize,
-    /// Where the products of slacks and multipliers begin. Default 1.
+    /// The initial barrier parameter `mu`, the product of slacks and multipliers. Default 1.
     pub start_mu: f64,
-    /// How many sets of active bounds a warm start tries before slacks and multipliers are moved
-    /// away from zero and the interior point begins. Each costs less than one of its iterations,
-    /// and counts as one. A cold start tries the solution without bounds, unless zero violates one.
-    /// Default 4.
+    /// The maximum number of active sets of a warm start, before slacks and multipliers are moved
+    /// away from zero and the interior point starts. Each costs less than an iteration of the
+    /// interior point, and counts as one. A cold start tries the solution without active bounds,
+    /// unless the zero point violates one. Default 4.
     pub active_sets: usize,
-    /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
+    /// The smallest slack and multiplier of a warm start. Default 1e-3.
     pub warm_distance: f64,
-    /// Whether a QP that was not solved is tried again, with as many iterations each time: from a
-    /// cold start, with proximal terms, and with all bounds soft, to see which of them cannot be
-    /// satisfied. Otherwise it is tried again with the iterations that are left. Default true.
+    /// Whether an unsolved QP is tried again with `max_iterations` for each attempt: from a cold
+    /// start, with proximal terms, and with all bounds soft, to locate constraints that cannot be
+    /// satisfied. Otherwise it is tried again with the remaining iterations. Default true.
     pub locate: bool,
-    /// Whether sizes of variables, constraints and the objective are found from the data, and
-    /// everything is compared with them: variables in pascal or kilometres are no worse than
-    /// others then. Where no size is above 32 or below its inverse there are no units. With them
-    /// all residuals in units are below a tenth of `tolerance`, and as they are below the larger
-    /// one of that and `1e6 ε` of their largest term, or of single precision 1e-5 of it. Default
-    /// true; [`HeapSqp`](crate::ocp::HeapSqp), which solves QPs in units of its own, asks for none.
+    /// Whether sizes of variables, constraints and the objective are computed from the data as
+    /// units of all tolerances: the units of variables (pascal, kilometres) then do not matter. If
+    /// no size is above 32 or below its inverse, all units are one. Otherwise all residuals in
+    /// units must be below a tenth of `tolerance`, and without units below the larger of
+    /// `tolerance` and `1e6 ε` of their largest term, in single precision 1e-5 of it. Default true;
+    /// [`HeapSqp`](crate::ocp::HeapSqp), which scales QPs itself, disables it.
     pub scaling: bool,
-    /// Lower bounds of minus this or less, and upper ones of this or more, mean that there is none.
-    /// Default 1e15; of single precision 1e7, where seven digits leave no unit.
+    /// Lower bounds of at most minus this and upper bounds of at least this are no bounds. Default
+    /// 1e15; in single precision 1e7, where seven digits leave no unit.
     pub no_bound: f64,
 }
 
 impl InteriorPointOptions {
-    /// For numbers of some precision.
+    /// The default options for a precision.
     #[must_use]
     pub fn new<T: Real>() -> Self {
         let (tolerance, relative_tolerance) = if T::EPSILON < 1e-10 { (1e-8, 0.0) } else { (1e-4, 1e-5) };

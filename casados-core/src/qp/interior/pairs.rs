@@ -1,11 +1,11 @@
-//! Slacks and multipliers of all sides: their steps, products and distances.
+//! Slacks and multipliers of all inequalities: their steps, products and distances.
 //!
-//! A side gives way to its multiplier: `σ (c v − bound) + e + δ (λ − λ₊) = s`, as the proximal
-//! method of multipliers has it (R. T. Rockafellar, "Augmented Lagrangians and applications of the
-//! proximal point algorithm", Math. Oper. Res. 1, 1976; S. Pougkakiotis, J. Gondzio, "An interior
-//! point-proximal method of multipliers for convex quadratic programming", Comput. Optim. Appl. 78,
-//! 2021). Its weight `λ / (s + δ λ)` stays below `1 / δ` then, however small its slack is, and
-//! leaves the digits of the Hessian beside it.
+//! Inequalities have a dual regularisation `δ`: `σ (c v − bound) + e + δ (λ − λ₊) = s`, by the
+//! proximal method of multipliers (R. T. Rockafellar, "Augmented Lagrangians and applications of
+//! the proximal point algorithm", Math. Oper. Res. 1, 1976; S. Pougkakiotis, J. Gondzio, "An
+//! interior point-proximal method of multipliers for convex quadratic programming", Comput. Optim.
+//! Appl. 78, 2021). The weight `λ / (s + δ λ)` is therefore below `1 / δ` for every slack, and the
+//! digits of the Hessian are preserved.
 
 use super::iterate::at;
 use super::sides::Inequalities;
@@ -18,14 +18,14 @@ use crate::qp::statistics::{nan_max, positive};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Inequalities<'_, T> {
-    /// `Σ s λ` over the number of pairs.
+    /// Returns `Σ s λ` over the number of pairs.
     #[inline(always)]
     pub fn mu<E: Packed<T>>(&self) -> T {
         let pairs = self.counts.pair_count().max(1);
         dot::<T, E>(self.slack, self.multiplier) / T::from_whole(pairs)
     }
 
-    /// A function of the value of the row and the bound, for every side, into `scratch`.
+    /// Writes a function of the value of the row and the bound of every side to `scratch`.
     #[inline(always)]
     pub fn evaluate_sides(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
         let count = self.counts.lower;
@@ -40,7 +40,7 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// Multipliers of a solution.
+    /// Reads the multipliers of a solution.
     pub fn load_multipliers(&mut self, solution: &SolutionView<'_, T>) {
         let (lower, upper) = self.rows.split_at_checked(self.counts.lower).unwrap_or_default();
         let sides = lower.iter().map(|&row| at(solution.lower, row));
@@ -48,14 +48,14 @@ impl<T: Real> Inequalities<'_, T> {
         for (multiplier, given) in self.multiplier.iter_mut().zip(sides) {
             *multiplier = given;
         }
-        for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
+        for (free, &row) in self.equation_multipliers.iter_mut().zip(&*self.equations) {
             *free = at(solution.lower, row) - at(solution.upper, row);
         }
     }
 
-    /// Slacks at least this far from zero, with multipliers from a solution or such that all
-    /// products are equal. `scratch` has the distances from the bounds.
-    pub fn begin(
+    /// Initialises slacks, at least `distance` units from zero, and multipliers, from a solution or
+    /// such that all products are equal. `scratch` has the distances from the bounds.
+    pub fn initialise(
         &mut self,
         start: QpStart,
         distance: T,
@@ -82,12 +82,11 @@ impl<T: Real> Inequalities<'_, T> {
             else {
                 break;
             };
-            // The gradient with respect to the violation vanishes from the start: λ + ν = linear +
-            // quadratic e.
+            // The gradient with respect to the violation vanishes: `λ + ν = linear + quadratic e`.
             let unit = self.rows.get(side).map_or(T::ONE, |&row| units.of(row as usize));
             let violation = (slack - value).max(distance * unit);
             let force = linear + quadratic * violation;
-            // Both products are as large as those of the others, or as equal as the force allows.
+            // Both products are equal to those of other pairs, as far as the sum `λ + ν` allows.
             let least = T::from_f64(0.01) * force;
             let share = product / slack;
             let least = if share < least { share } else { least };
@@ -99,7 +98,7 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// `Σ s λ` over the number of pairs after a part of the predictor.
+    /// Returns `Σ s λ` over the number of pairs after the fraction `alpha` of the predictor.
     #[inline(always)]
     pub fn mu_after<E: Packed<T>>(&self, alpha: T, mu: T) -> T {
         let pairs = self.counts.pair_count().max(1);
@@ -107,14 +106,14 @@ impl<T: Real> Inequalities<'_, T> {
         (T::ONE - alpha) * mu + alpha * alpha * products
     }
 
-    /// The largest violation of a side in units, before anything else is in `scratch`.
+    /// Returns the largest violation of a side in units; `scratch` must still have the distances.
     #[inline(always)]
     pub fn violation(&self, units: Units<'_, T>) -> T {
         let distances = self.scratch.iter().zip(&*self.rows);
         distances.fold(T::ZERO, |most, (&distance, &row)| (-distance / units.of(row as usize)).max(most))
     }
 
-    /// The largest residual of a side or an equation in units.
+    /// Returns the largest residual of a side or an equation in units.
     #[inline(always)]
     pub fn max_residual<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         if units.rows.is_empty() {
@@ -128,26 +127,27 @@ impl<T: Real> Inequalities<'_, T> {
             .fold(T::ZERO, |most, (residual, &row)| nan_max(most, residual.abs() / units.of(row as usize)))
     }
 
-    /// `s Δλ + λ Δs = μ − s λ`
+    /// Sets the targets `s Δλ + λ Δs = μ − s λ`.
     #[inline(always)]
     pub fn centring_targets(&mut self, mu: T) {
-        let own = self.compliance;
+        let own = self.dual_regularisation;
         let mut pairs = self.slack.iter().zip(&*self.multiplier);
         let mut targets = self.inverse.iter_mut().zip(&mut *self.target);
         for ((&softness, (&slack, &multiplier)), (inverse, target)) in
-            self.softness.iter().zip(&mut pairs).zip(&mut targets)
+            self.regularisation_scale.iter().zip(&mut pairs).zip(&mut targets)
         {
             *inverse = T::ONE / (slack + own * softness * multiplier);
             *target = (mu - slack * multiplier) * *inverse;
         }
-        // Violations do not give way.
+        // Violations have no dual regularisation.
         for ((&slack, &multiplier), (inverse, target)) in pairs.zip(targets) {
             *inverse = T::ONE / slack;
             *target = (mu - slack * multiplier) * *inverse;
         }
     }
 
-    /// The corrector: `s Δλ + λ Δs = σμ − s λ − Δs Δλ` of the predictor.
+    /// Sets the targets of the corrector, `s Δλ + λ Δs = σμ − s λ − Δs Δλ`, with the products of
+    /// the predictor.
     #[inline(always)]
     pub fn corrector_targets(&mut self, sigma_mu: T) {
         let steps = self.slack_step.iter().zip(&*self.multiplier_step);
@@ -159,7 +159,8 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// What the sides add to the gradient of Newton's equations, into `scratch`, and their weights.
+    /// Writes the gradient terms of the sides in Newton's equations to `scratch`, and computes
+    /// their weights.
     #[inline(always)]
     pub fn assemble_weights(&mut self, weights: bool) {
         if weights {
@@ -183,13 +184,13 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// Changes of slacks from the changes of rows in `scratch`, and of multipliers.
+    /// Computes the changes of slacks, from the changes of rows in `scratch`, and of multipliers.
     #[inline(always)]
     pub fn steps(&mut self) {
-        let (sides, compliance) = (self.counts.sides(), self.compliance);
+        let (sides, compliance) = (self.counts.sides(), self.dual_regularisation);
         let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
         let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
-        let changes = self.scratch.iter().zip(&*self.residual).zip(&*self.softness);
+        let changes = self.scratch.iter().zip(&*self.residual).zip(&*self.regularisation_scale);
         for (
             ((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)),
             ((&change, &residual), &softness),
@@ -202,8 +203,8 @@ impl<T: Real> Inequalities<'_, T> {
         for (j, &side) in self.soft.iter().enumerate() {
             let Some(soft) = self.soft_side(j, side as usize) else { break };
             let change = at(self.scratch, side) + at(self.residual, side);
-            // The change of `s − e`, and their sum written such that it keeps its digits where the
-            // slack is small and its weight large.
+            // The change of `s − e`, and their sum, in a form without cancellation for small slacks
+            // with large weights.
             let change = change * soft.share + soft.own_compliance * soft.target;
             let violation = (soft.sum - soft.stiffness * change) * soft.inverse;
             let step = (soft.sum + soft.compliance * change) * soft.inverse;
@@ -214,7 +215,7 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// A soft side with its violation eliminated.
+    /// Eliminates the violation of a soft side.
     #[inline(always)]
     fn soft_side(&self, j: usize, side: usize) -> Option<CondensedSoftSide<T>> {
         let violation = self.counts.sides() + j;
@@ -222,7 +223,7 @@ impl<T: Real> Inequalities<'_, T> {
         let stiffness = multiplier / slack;
         let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
         let quadratic = *self.quadratic.get(j)?;
-        let own_compliance = self.compliance * *self.softness.get(side)?;
+        let own_compliance = self.dual_regularisation * *self.regularisation_scale.get(side)?;
         let own = *self.target.get(side)? * (T::ONE + own_compliance * stiffness);
         let others = *self.target.get(violation)?;
         let inverse = T::ONE / (quadratic + stiffness + other);
@@ -244,16 +245,16 @@ impl<T: Real> Inequalities<'_, T> {
         })
     }
 
-    /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what
-    /// they have.
+    /// Returns the largest step length, at most 1, after which slacks and multipliers keep the
+    /// fraction `keep` of their values.
     #[inline(always)]
-    pub fn step_to_boundary<E: Packed<T>>(&self, keep: T) -> T {
-        let most = T::ONE - keep;
+    pub fn step_to_boundary<E: Packed<T>>(&self, boundary_fraction: T) -> T {
+        let most = T::ONE - boundary_fraction;
         let ratio = largest_negative_ratio::<T, E>(most, self.slack_step, self.slack);
         most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
     }
 
-    /// What violations cost, of distances in `scratch`.
+    /// Returns the penalties of the violations, for distances in `scratch`.
     pub fn violation_cost(&self) -> T {
         let costs = self.soft.iter().zip(self.linear.iter().zip(&*self.quadratic));
         costs.fold(T::ZERO, |sum, (&side, (&linear, &quadratic))| {
@@ -262,7 +263,7 @@ impl<T: Real> Inequalities<'_, T> {
         })
     }
 
-    /// Splits distances of soft sides in `scratch` into what is above zero and violations.
+    /// Splits the distances of soft sides in `scratch` into nonnegative distances and violations.
     pub fn split_soft_distances(&mut self) {
         let sides = self.counts.sides();
         for (j, &side) in self.soft.iter().enumerate() {
@@ -272,9 +273,10 @@ impl<T: Real> Inequalities<'_, T> {
         }
     }
 
-    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, in units, of
-    /// distances and violations in `scratch`, whatever slacks are.
-    pub fn judge(&self, units: Units<'_, T>) -> (T, T) {
+    /// Returns the residuals of inequalities and complementarity in units as
+    /// [`qp::residuals`](crate::qp::residuals) does, from the distances and violations in
+    /// `scratch`, independently of the slacks.
+    pub fn residuals(&self, units: Units<'_, T>) -> (T, T) {
         let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
         let force = units.objective;
         let (distances, violations) = self.scratch.split_at_checked(self.counts.sides()).unwrap_or_default();
@@ -297,7 +299,7 @@ impl<T: Real> Inequalities<'_, T> {
     }
 }
 
-/// What a soft side is to the others.
+/// A soft side after elimination of its violation.
 struct CondensedSoftSide<T> {
     weight: T,
     target: T,

@@ -1,14 +1,14 @@
-//! Residuals of an iterate, and what they are sums of.
+//! Residuals of an iterate, and their terms.
 
 use super::iterate::Iterate;
 use super::units::Units;
 use super::vector::{largest_product, largest_scaled_magnitude, largest_size};
-use crate::qp::layout::{Places, part};
+use crate::qp::layout::{StageOffsetsIter, part};
 use crate::qp::marked_indices;
 use crate::qp::statistics::{Residuals, nan_max};
 use crate::scalar::{Packed, Real};
 
-/// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
+/// Residuals of the optimality conditions, the largest element of each: see [`Residuals`].
 #[derive(Clone, Copy)]
 pub struct MaxResiduals<T> {
     pub stationarity: T,
@@ -30,31 +30,31 @@ impl<T: Real> From<MaxResiduals<T>> for Residuals {
 }
 
 impl<T: Real> Iterate<'_, T> {
-    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, in units, after
-    /// [`evaluate`](Self::evaluate).
+    /// Returns the residuals as [`qp::residuals`](crate::qp::residuals) does, in units, after
+    /// [`evaluate`](Self::evaluate), at least the rounding errors of their terms.
     #[inline(always)]
-    pub fn judged<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
+    pub fn evaluated_residuals<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
         let MaxResiduals { stationarity, dynamics, inequalities, complementarity } =
             self.point_residuals::<E>();
-        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
-        // the terms; in another order the sums of values are rounded otherwise.
+        // The recursion for `π` makes gradients zero up to rounding errors; another order of
+        // summation has other rounding errors.
         let rounding = |terms| T::from_f64(T::EPSILON) * terms;
         MaxResiduals {
-            stationarity: nan_max(stationarity, rounding(self.terms.forces)),
-            dynamics: nan_max(dynamics, rounding(self.terms.values)),
+            stationarity: nan_max(stationarity, rounding(self.terms.gradient_terms)),
+            dynamics: nan_max(dynamics, rounding(self.terms.condition_terms)),
             inequalities,
             complementarity,
         }
     }
 
-    /// As [`judged`](Self::judged), without what rounding may be.
+    /// As [`judged`](Self::judged), without the rounding errors.
     #[inline(always)]
     pub fn point_residuals<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
-        self.sides.split_soft_distances();
+        self.inequalities.split_soft_distances();
         self.residuals_in_units::<E>(self.measure)
     }
 
-    /// Residuals that were [`judged`](Self::judged), in the units of the user.
+    /// Returns the [`judged`](Self::judged) residuals without units.
     pub fn unscaled_residuals(&self, judged: MaxResiduals<T>) -> Residuals {
         if self.measure.rows.is_empty() {
             judged.into()
@@ -65,7 +65,7 @@ impl<T: Real> Iterate<'_, T> {
 
     #[inline(always)]
     pub fn residuals_in_units<E: Packed<T>>(&self, units: Units<'_, T>) -> MaxResiduals<T> {
-        let (inequalities, complementarity) = self.sides.judge(units);
+        let (inequalities, complementarity) = self.inequalities.residuals(units);
         MaxResiduals {
             stationarity: self.max_gradient::<E>(units),
             dynamics: self.gaps::<E>(units),
@@ -74,7 +74,7 @@ impl<T: Real> Iterate<'_, T> {
         }
     }
 
-    /// The largest element of the gradient of the Lagrangian.
+    /// Returns the largest element of the gradient of the Lagrangian.
     #[inline(always)]
     pub fn max_gradient<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         if units.rows.is_empty() {
@@ -83,14 +83,14 @@ impl<T: Real> Iterate<'_, T> {
         largest_scaled_magnitude(T::ZERO, self.stationarity, units.rows, |g, unit| g * unit) / units.objective
     }
 
-    /// The largest residual of dynamics and of conditions between stages.
+    /// Returns the largest residual of dynamics and of couplings.
     #[inline(always)]
     pub fn gaps<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         let over = |gap, unit| gap / unit;
         let gaps = if units.rows.is_empty() {
             largest_size::<T, E>(self.dynamics)
         } else {
-            Places::<T>::new(self.qp.dims).fold(T::ZERO, |most, place| {
+            StageOffsetsIter::<T>::new(self.qp.dims).fold(T::ZERO, |most, place| {
                 let gaps = part(self.dynamics, place.dynamics, place.next);
                 largest_scaled_magnitude(most, gaps, units.from(place.row + place.rows), over)
             })
@@ -100,16 +100,17 @@ impl<T: Real> Iterate<'_, T> {
         conditions.fold(gaps, |most, (gap, state)| nan_max(most, over(gap.abs(), units.of(state))))
     }
 
-    /// The residuals as they are known, in units.
+    /// Returns the updated residuals, in units.
     #[inline(always)]
     pub fn residuals<E: Packed<T>>(&self) -> MaxResiduals<T> {
-        // Products may lose NaN, their sum does not.
-        let products = largest_product::<T, E>(T::ZERO, self.sides.slack, self.sides.multiplier);
+        // Products may lose NaN, but their sum does not.
+        let products =
+            largest_product::<T, E>(T::ZERO, self.inequalities.slack, self.inequalities.multiplier);
         let products = if self.mu.is_finite() { products } else { self.mu };
         MaxResiduals {
             stationarity: self.max_gradient::<E>(self.measure),
             dynamics: self.gaps::<E>(self.measure),
-            inequalities: self.sides.max_residual::<E>(self.measure),
+            inequalities: self.inequalities.max_residual::<E>(self.measure),
             complementarity: products / self.measure.objective,
         }
     }

@@ -6,8 +6,8 @@
 //! M_uu = L Lᵀ,   K = M_xu L⁻ᵀ,   P = M_xx − K Kᵀ
 //! ```
 //!
-//! `(K; L)` is what is kept of a stage: a panel with a column for each control. The controls of a
-//! stage are few, so that this classical form needs less than the one with the square root of `P`.
+//! `(K; L)` is stored for each stage: a panel with a column for each control. With few controls
+//! this classical form takes fewer operations than the square-root form.
 
 use super::cholesky::{eliminate, substitute};
 use super::kernels::{
@@ -17,30 +17,30 @@ use super::kernels::{
 use super::shared::Shared;
 use crate::qp::error::QpError;
 use crate::qp::layout::{
-    Places, StageDims, StageOffsets, copy_common, end, padded_len, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, end, padded_len, part, part_mut, take_mut,
 };
 use crate::qp::problem::QpView;
 use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
-/// Whether there are gains beside the factors.
+/// Whether gains are stored beside the factors.
 pub const GAINS: bool = REGISTERS;
 
 /// How the first state is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitialStateKind {
-    /// It is given.
+    /// It is fixed.
     Fixed,
     /// It is eliminated like controls.
     Free,
-    /// It is found together with what couples stages.
+    /// It is solved for together with the couplings.
     Coupled,
 }
 
 /// Memory of the recursion.
 pub struct Riccati<'a, T> {
-    /// `M` of the stage at work.
+    /// `M` of the current stage.
     pub m: &'a mut [T],
     /// `−[A B]ᵀ P₊` and `−[C D]ᵀ diag(w)`
     pub w: &'a mut [T],
@@ -52,37 +52,35 @@ pub struct Riccati<'a, T> {
     pub gains: &'a mut [T],
     /// Reciprocals of pivots.
     pub inverse: &'a mut [T],
-    /// What was added to pivots.
+    /// Increases of pivots.
     pub added: &'a mut [T],
-    /// `L⁻¹ g_u`, on the way forwards `−M_uu⁻¹ g_u`.
+    /// `L⁻¹ g_u` in the backward pass, `−M_uu⁻¹ g_u` in the forward pass.
     pub y: &'a mut [T],
     /// `−P₊ r`
     offset: &'a mut [T],
-    /// The gradient of the stage at work.
+    /// The gradient of the current stage.
     pub g: &'a mut [T],
-    /// `p` on the way backwards, then `−(p₊ + P₊ r)`, and the negative gradient of general
+    /// `p` in the backward pass, then `−(p₊ + P₊ r)`, and the negative gradient of general
     /// constraints.
     pub minus: &'a mut [T],
-    /// Pivots that were made larger.
+    /// The number of increased pivots.
     pub regularised: usize,
-    /// Negative pivots, where these are allowed.
+    /// The number of negative pivots, if these are accepted.
     pub negative: usize,
-    /// The largest element of the diagonals so far: what elimination has subtracted was as large as
-    /// that.
+    /// The largest element of the diagonals so far, which bounds the subtracted terms.
     pub largest: T,
-    /// Behind the last stage.
+    /// The offsets after the last stage.
     pub end: StageOffsets,
 }
 
-/// What is known of a horizon once its stages are gone through: the largest dimensions, and the
-/// place behind the last stage.
+/// The largest dimensions of a horizon, and the offsets after its last stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    /// The most variables of a stage.
+    /// The maximum number of variables of a stage.
     pub n: usize,
-    /// The longest column of a stage.
+    /// The maximum stride of columns of a stage.
     pub ld: usize,
-    /// The most states of a stage.
+    /// The maximum number of states of a stage.
     pub nx: usize,
     next_and_ng: usize,
     pub end: StageOffsets,
@@ -112,7 +110,7 @@ const fn larger_index(a: usize, b: usize) -> usize {
 }
 
 impl<'a, T: Real> Riccati<'a, T> {
-    /// How many numbers it takes.
+    /// Returns the length of the memory.
     pub const fn memory(dims: &[StageDims]) -> usize {
         let Extent { n, ld, nx, next_and_ng, end } = Extent::of::<T>(dims);
         let matrices = ld * (n + PADDING_COLUMNS)
@@ -121,7 +119,7 @@ impl<'a, T: Real> Riccati<'a, T> {
         let factors = if GAINS { 2 * end.factor } else { end.factor };
         matrices + factors + 3 * end.v + end.dynamics + ld + padded_len::<T>(next_and_ng)
     }
-    /// In memory that is zero.
+    /// A recursion in memory that is zero.
     pub fn new(extent: &Extent, memory: &mut &'a mut [T]) -> Self {
         let Extent { n, ld, nx, next_and_ng, end } = *extent;
         Self {
@@ -151,17 +149,18 @@ pub struct Equations<'a, T> {
     pub first: InitialStateKind,
     /// Whether the Hessian counts.
     pub objective: bool,
-    /// Whether controls may have pivots of either sign: what counts is the inertia of the whole.
+    /// Whether controls may have pivots of either sign, since only the inertia of the whole system
+    /// counts.
     pub indefinite: bool,
     /// Weights of bounds and general constraints.
     pub weights: &'a [T],
-    /// Gradient, over variables and general constraints.
+    /// The gradient, over variables and general constraints.
     pub gradient: &'a [T],
     /// `r`
     pub dynamics: &'a [T],
 }
 
-/// A solve as a function of its own.
+/// The arguments of [`Riccati::solve`].
 struct Solve<'s, 'a, T, E> {
     riccati: &'s mut Riccati<'a, T>,
     equations: Equations<'s, T>,
@@ -183,7 +182,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
 }
 
 impl<T: Real> Riccati<'_, T> {
-    /// Solves Newton's equations, for a new matrix or for that of the last time and its `r`. `step`
+    /// Solves Newton's equations, for a new matrix, or for the previous matrix and its `r`. `step`
     /// is `Δ`, with the changes of the general constraints.
     ///
     /// # Errors
@@ -200,8 +199,7 @@ impl<T: Real> Riccati<'_, T> {
         result
     }
 
-    /// The next solve with the same matrix has other residuals of the dynamics: none, but for
-    /// rounding.
+    /// Sets the dynamics residuals of the next solve with the same matrix to zero.
     pub fn clear_dynamics_residuals(&mut self) {
         self.offset.fill(T::ZERO);
     }
@@ -220,11 +218,11 @@ impl<T: Real> Riccati<'_, T> {
             self.negative = 0;
             self.largest = T::ZERO;
         }
-        for place in Places::<T>::with_known_end(qp.dims, self.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(qp.dims, self.end).rev() {
             let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
-            // −(p₊ + P₊ r), behind the end of the horizon nothing; then the general constraints.
+            // `−(p₊ + P₊ r)`, empty at the end of the horizon; then the general constraints.
             let offset = part_mut(self.offset, place.dynamics, ld_next);
             if factor {
                 let p = Columns { data: &*self.p, ld: ld_next };
@@ -273,7 +271,7 @@ impl<T: Real> Riccati<'_, T> {
             self.substitute_controls(qp);
         }
         let mut rest = step;
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let here = take_mut(&mut rest, place.rows);
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
@@ -317,11 +315,11 @@ impl<T: Real> Riccati<'_, T> {
         }
     }
 
-    /// What controls are where the state is zero, before the way forwards: nothing on it waits for
-    /// that.
+    /// Computes the controls `−M_uu⁻¹ g_u` at a zero state for all stages, before the forward pass
+    /// and outside its chain of dependent operations.
     #[inline(always)]
     fn substitute_controls(&mut self, qp: QpView<'_, T>) {
-        for StageOffsets { v, nx, nu, ld, factor, .. } in Places::<T>::new(qp.dims) {
+        for StageOffsets { v, nx, nu, ld, factor, .. } in StageOffsetsIter::<T>::new(qp.dims) {
             let panel = part(self.panels, factor, ld * nu);
             substitute(part_mut(self.y, v + nx, nu), panel, ld, nx, part(self.inverse, v + nx, nu));
         }

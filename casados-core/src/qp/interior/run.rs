@@ -1,4 +1,4 @@
-//! The iterations.
+//! The iterations of the interior point.
 
 use super::iterate::Iterate;
 use super::limits::ResidualTolerances;
@@ -9,48 +9,48 @@ use super::terms::Terms;
 use super::vector::{dot, largest_size};
 use crate::qp::element::set;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, copy_common, part, part_mut};
+use crate::qp::layout::{StageOffsetsIter, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
 use crate::qp::statistics::{QpStatistics, nan_max};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
-/// How a problem is to be solved.
+/// The settings of an attempt.
 #[derive(Clone, Copy)]
 pub struct Attempt {
     pub penalties: PenaltyMode,
     pub start: QpStart,
-    /// Whether steps are kept short by proximal terms, for Hessians that are singular.
+    /// Whether steps have proximal terms, for singular Hessians.
     pub proximal: bool,
-    /// What attempts before have taken.
+    /// The statistics of earlier attempts.
     pub statistics: QpStatistics,
-    /// The iterations at which it ends.
+    /// The iteration count at which it ends.
     pub iterations: usize,
-    /// Whether it ends where its multipliers are nearly a proof that there is no solution.
+    /// Whether it ends if its multipliers are nearly a certificate of infeasibility.
     pub suspects: bool,
 }
 
 impl Attempt {
-    /// Whether nothing was tried before.
+    /// Returns whether this is the first attempt.
     fn is_first(&self) -> bool {
         self.penalties == PenaltyMode::Given && !self.proximal && self.statistics.iterations == 0
     }
 }
 
-/// One run of the method.
+/// A run of the method.
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
     pub limits: ResidualTolerances<T>,
-    /// Whether the time is over.
+    /// Returns whether the time limit is reached.
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
-    /// The most variables of a stage.
+    /// The maximum number of variables of a stage.
     pub variables: usize,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<QpStatistics, QpError>,
-    /// Whether the multipliers prove that no point satisfies all constraints; of the problem as it
-    /// is, whether they are nearly a proof.
+    /// Whether the multipliers are a certificate of infeasibility; with the objective, whether they
+    /// nearly are.
     pub infeasible: &'r mut bool,
 }
 
@@ -60,7 +60,7 @@ compiled! {
 }
 
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
-    // In wider ones what is padding would be computed, too.
+    // Wider registers would also compute padding.
     fn lanes(&self) -> usize {
         self.variables
     }
@@ -73,7 +73,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
         }
         let tries = match attempt.start {
             QpStart::Warm => options.active_sets,
-            // Where no bound is active this is the solution.
+            // This is the solution if no bound is active.
             QpStart::Cold if attempt.is_first() => options.active_sets.min(1),
             QpStart::Cold => 0,
         };
@@ -83,7 +83,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                 zero.fill(T::ZERO);
             }
         }
-        // No closure: it would be compiled for another machine.
+        // A closure would be compiled for the baseline instruction set.
         *result = match iterate.by_active_sets::<E>((attempt.start, tries), &limits, over, solution) {
             Ok(statistics) => Ok(statistics),
             Err(statistics) => {
@@ -91,7 +91,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                     attempt.statistics = statistics;
                 }
                 if attempt.start == QpStart::Cold {
-                    iterate.forget();
+                    iterate.reset();
                 }
                 iterate.initialise::<E>(options, &attempt, &limits, solution);
                 iterate.iterate_to_convergence::<E>(&attempt, &limits, over, solution, infeasible)
@@ -104,37 +104,39 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     }
 }
 
-/// A step of the corrector below this is not taken.
+/// The smallest accepted step length of the corrector.
 const MIN_CORRECTOR_STEP: f64 = 0.3;
 
-/// The terms of the residuals are computed again where `μ` is this part of what it was.
+/// The terms of the residuals are evaluated again if `μ` has decreased by this factor.
 const TERMS_UPDATE_RATIO: f64 = 0.01;
 
-/// An iteration that leaves less than this part makes progress; so many may make none.
-const PROGRESS: f64 = 0.9;
+/// An iteration makes progress if it decreases the residuals by this factor; the maximum number of
+/// iterations without progress.
+const PROGRESS_RATIO: f64 = 0.9;
 const MAX_IDLE_ITERATIONS: usize = 50;
-/// After so many correctors may go in a circle.
+/// The number of iterations without progress after which the correctors are assumed to cycle.
 const CYCLE: usize = 8;
 
-/// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
-const MIN_BOUNDARY_FRACTION: f64 = 0.005;
+/// Slacks and multipliers keep at least this fraction of their values, or, near the solution, the
+/// fraction `μ`.
+const MAX_BOUNDARY_FRACTION: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
-    /// States and controls of a solution.
+    /// Reads states and controls of a solution.
     pub fn load_point(&mut self, solution: &SolutionView<'_, T>) {
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             copy_common(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
     }
 
-    /// A point and multipliers of zero.
-    fn forget(&mut self) {
+    /// Sets the point and the multipliers to zero.
+    fn reset(&mut self) {
         self.v.fill(T::ZERO);
-        self.sides.multiplier.fill(T::ZERO);
-        self.sides.free.fill(T::ZERO);
+        self.inequalities.multiplier.fill(T::ZERO);
+        self.inequalities.equation_multipliers.fill(T::ZERO);
     }
 
-    /// The state at the start, if it is given.
+    /// Writes the fixed initial state.
     pub fn load_initial_state(&mut self) {
         if let (InitialStateKind::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
             let x0 = stage.x_bounds().lower;
@@ -157,31 +159,31 @@ impl<T: Real> Iterate<'_, T> {
         self.load_initial_state();
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu).sqrt();
-        let gap = self.gaps::<E>(self.measure).max(self.sides.violation(self.measure));
+        let gap = self.gaps::<E>(self.measure).max(self.inequalities.violation(self.measure));
         let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
-            // The farther it is from being feasible, the less its slacks and multipliers mean.
+            // Slacks and multipliers of a point with large violations are less reliable.
             QpStart::Warm if warm < cold => warm,
-            // Slacks that are small beside violations make steps short.
+            // Slacks that are small compared with violations cause short steps.
             QpStart::Cold if attempt.proximal => gap.max(cold),
             _ => cold,
         };
-        self.sides.begin(start, distance, self.measure, solution);
-        // Only now are slacks what they are.
+        self.inequalities.initialise(start, distance, self.measure, solution);
+        // Residuals depend on the slacks, which are set now.
         self.evaluate_side_residuals::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
         self.set_regularisation(attempt.proximal);
     }
 
-    /// The gradient before the first step. No step depends on the multipliers of the dynamics:
-    /// where the recursion, still without feedback, lets them grow so large that a gradient that
-    /// should vanish is not seen among their rounding errors, they are zero.
+    /// Evaluates the gradient before the first step. The open-loop recursion of the multipliers
+    /// `π`, without factors yet, may grow so much that its rounding errors exceed the tolerance of
+    /// the gradient; then `π` is set to zero. No step depends on `π`.
     #[inline(always)]
     pub fn first_gradient<E: Packed<T>>(&mut self, limits: &ResidualTolerances<T>, multipliers: &mut [T]) {
         self.evaluate_gradient::<E>(multipliers);
-        let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
-        // NaN is not small either.
-        let is_seen = rounding <= limits.of(self.terms).forces;
+        let rounding = T::from_f64(T::EPSILON) * self.terms.gradient_terms;
+        // NaN counts as large.
+        let is_seen = rounding <= limits.of(self.terms).gradient_terms;
         if !is_seen {
             multipliers.fill(T::ZERO);
             self.gradient_with_costates::<E>(multipliers);
@@ -203,42 +205,43 @@ impl<T: Real> Iterate<'_, T> {
         let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
         let (mut best, mut idle) = (T::from_f64(f64::INFINITY), 0);
-        let first = (statistics.iterations, self.terms.forces.max(T::ONE));
+        let first = (statistics.iterations, self.terms.gradient_terms.max(T::ONE));
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.satisfied_by(residuals, self.terms);
-            // Terms change on the way.
+            // Terms change with the iterates.
             let old = limits.relative > T::ZERO && self.mu < T::from_f64(TERMS_UPDATE_RATIO) * known;
             if small || old {
-                // What is known of the residuals is what steps should have left of them: now they
-                // are computed.
+                // The updated residuals are small: evaluate them at the point.
                 let objective = self.evaluate::<E>(solution.dynamics);
-                (residuals, known) = (self.judged::<E>(), self.mu);
+                (residuals, known) = (self.evaluated_residuals::<E>(), self.mu);
                 if objective.is_finite() && self.is_converged(residuals, limits) {
                     (statistics.objective, statistics.residuals) =
                         (objective.to_f64(), self.unscaled_residuals(residuals));
                     return Ok(statistics);
                 }
-                let Terms { forces, values } = limits.of(self.terms);
+                let Terms { gradient_terms: forces, condition_terms: values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
                 if limits.satisfied_by(residuals, self.terms) {
-                    // In units they are, but not beside their terms.
+                    // The residuals are small in units, but not without units relative to their
+                    // terms.
                     share = share * T::from_f64(0.01);
                 } else if small && apart {
-                    // Between two pieces of a penalty multipliers are off by the root of their
+                    // At the kink of a penalty multipliers have errors of the square root of their
                     // products.
                     share = share * T::from_f64(0.01);
                 } else if small && statistics.refinements > known_refinements + 3 {
                     break true;
                 } else {
-                    // Multipliers and slacks are good: the next step is to correct the others only.
+                    // Multipliers and slacks have converged: the next step corrects the other
+                    // residuals only.
                     refine = small;
                     statistics.refinements += usize::from(small);
                 }
             }
-            // Products far below the tolerance gain nothing, and make weights that swallow the
-            // digits of everything else.
-            let floor = share * limits.of(self.terms).forces * self.measure.objective;
+            // Products far below the tolerance have no benefit, and cause weights that cancel the
+            // digits of all other terms.
+            let floor = share * limits.of(self.terms).gradient_terms * self.measure.objective;
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
                 break false;
@@ -251,15 +254,16 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
             // NaN makes no progress.
-            let left = nan_max(residuals.stationarity, nan_max(residuals.dynamics, residuals.inequalities));
-            let left = left + self.mu / self.measure.objective;
-            if left < T::from_f64(PROGRESS) * best {
-                (best, idle) = (left, 0);
+            let residual =
+                nan_max(residuals.stationarity, nan_max(residuals.dynamics, residuals.inequalities));
+            let residual = residual + self.mu / self.measure.objective;
+            if residual < T::from_f64(PROGRESS_RATIO) * best {
+                (best, idle) = (residual, 0);
             } else if idle > MAX_IDLE_ITERATIONS {
                 break true;
             }
             idle += 1;
-            self.sides.centring_targets(if refine { self.mu.max(floor) } else { T::ZERO });
+            self.inequalities.centring_targets(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
@@ -269,14 +273,14 @@ impl<T: Real> Iterate<'_, T> {
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
                 break true;
             }
-            self.advance::<E>(alpha);
+            self.take_step::<E>(alpha);
             refine = false;
         };
         self.final_status::<E>(statistics, limits, [out_of_time, stalled], solution)
     }
 
-    /// Corrects the step for what products change by, and by how much of it slacks and multipliers
-    /// stay positive.
+    /// Adds Mehrotra's corrector to the step, for the second-order terms of the products, and
+    /// returns the step length to the boundary.
     ///
     /// # Errors
     /// [`QpError::NotConvex`]
@@ -287,30 +291,31 @@ impl<T: Real> Iterate<'_, T> {
         floor: T,
         is_cycling: bool,
     ) -> Result<T, QpError> {
-        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(MIN_BOUNDARY_FRACTION));
+        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(MAX_BOUNDARY_FRACTION));
         let distance = (self.mu / self.measure.objective).max(least);
         let keep = if distance < boundary { distance } else { boundary };
-        let mut alpha = self.sides.step_to_boundary::<E>(keep);
+        let mut alpha = self.inequalities.step_to_boundary::<E>(keep);
         let has_products = self.mu > T::ZERO;
         if refine || !has_products {
             return Ok(alpha);
         }
-        let after = self.sides.mu_after::<E>(alpha, self.mu);
+        let after = self.inequalities.mu_after::<E>(alpha, self.mu);
         let ratio = after / self.mu;
-        self.sides.corrector_targets((self.mu * ratio * ratio * ratio).max(floor));
+        self.inequalities.corrector_targets((self.mu * ratio * ratio * ratio).max(floor));
         self.newton::<E>(false)?;
-        alpha = self.sides.step_to_boundary::<E>(keep);
+        alpha = self.inequalities.step_to_boundary::<E>(keep);
         if alpha < T::from_f64(MIN_CORRECTOR_STEP) || is_cycling {
-            // Products are too different for the corrector to be right: first they are made equal.
-            self.sides.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
+            // The products differ too much for the corrector: a centring step makes them equal
+            // first.
+            self.inequalities.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
             self.newton::<E>(false)?;
-            alpha = self.sides.step_to_boundary::<E>(keep);
+            alpha = self.inequalities.step_to_boundary::<E>(keep);
         }
         Ok(alpha)
     }
 
-    /// What is said of the point that is left, which may be better than what was known of it: so
-    /// are the multipliers of the dynamics.
+    /// Returns the status at the final point, after evaluating its residuals and the multipliers
+    /// `π`.
     #[inline(always)]
     fn final_status<E: Packed<T>>(
         &mut self,
@@ -320,7 +325,7 @@ impl<T: Real> Iterate<'_, T> {
         solution: &mut SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
-        let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
+        let (judged, iterations) = (self.evaluated_residuals::<E>(), statistics.iterations);
         let residuals = self.unscaled_residuals(judged);
         let is_solved = self.is_converged(judged, limits) || self.is_converged_unscaled(limits);
         if objective.is_finite() && is_solved {
@@ -336,14 +341,14 @@ impl<T: Real> Iterate<'_, T> {
         })
     }
 
-    /// The point and its multipliers.
+    /// Writes the point and its multipliers.
     pub fn store(&mut self, solution: &mut SolutionView<'_, T>) {
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             copy_common(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
         }
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         for (i, (&row, &multiplier)) in sides.rows.iter().zip(&*sides.multiplier).enumerate() {
             let side = if i < sides.counts.lower { &mut *solution.lower } else { &mut *solution.upper };
             set(side, row as usize, multiplier);
@@ -352,7 +357,7 @@ impl<T: Real> Iterate<'_, T> {
             set(solution.lower, row, force.max(T::ZERO));
             set(solution.upper, row, (-force).max(T::ZERO));
         };
-        for (&row, &free) in sides.equations.iter().zip(&*sides.free) {
+        for (&row, &free) in sides.equations.iter().zip(&*sides.equation_multipliers) {
             equation(row as usize, free);
         }
         if self.first == InitialStateKind::Fixed {

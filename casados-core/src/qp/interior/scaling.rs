@@ -1,4 +1,4 @@
-//! Units of a QP: sizes of variables, of general constraints and of the objective.
+//! Units of a QP: typical sizes of variables, general constraints and the objective.
 //!
 //! ```text
 //! f     objective      mean of √gain, squared: h² / m of what a variable gains, m d² of what it costs
@@ -6,31 +6,32 @@
 //! r     constraint     |c| u
 //! ```
 //!
-//! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where that is zero, and `d` the
-//! distance of the bounds from zero. A state without either is as large as what leads to it. Where
-//! no size is far from one all units are one.
+//! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where the diagonal is zero, and `d`
+//! the distance of the bounds from zero. A state without curvature has the size of its dynamics. If
+//! all sizes are near one all units are one.
 //!
-//! No number of the QP is scaled: units are what the algorithm compares with. Slacks begin at `u`
-//! and multipliers at `f / u`, a row gives way `√ε u² / f` to a unit of force, and residuals are
-//! measured in units. Then iterates of a QP in other units are those iterates in other units: the
+//! The data of the QP is not scaled: units are the reference of comparisons. Initial slacks are `u`
+//! and multipliers `f / u`, the dual regularisation of a row is `√ε u² / f`, and residuals are
+//! measured in units. A QP in other units therefore has the same iterates in other units: the
 //! Riccati recursion is invariant, as the Cholesky factor is (N. J. Higham, "Accuracy and Stability
 //! of Numerical Algorithms", SIAM 2002, section 10.1).
 
-use super::sides::Reading;
+use super::sides::ConstraintInterpretation;
 use crate::qp::element::set;
-use crate::qp::layout::{Places, StageOffsets, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
-/// Where all sizes are between the inverse of this and this, or on both sides, units are one.
+/// The units are one if each item has a size between the inverse of this and this, or sizes on both
+/// sides of this range.
 const WELL_SCALED_RANGE: f64 = 32.0;
-/// No unit is larger, or smaller than its inverse.
+/// The largest unit, and the inverse of the smallest.
 const MAX_UNIT: f64 = 1e12;
-/// A unit is no more than so many times the room between bounds.
+/// The largest ratio of a unit to the range between bounds.
 const MAX_UNIT_PER_RANGE: f64 = 4.0;
 
-/// The least and the largest of the sizes that something may have.
+/// The smallest and the largest size of an item.
 struct SizeRange<T> {
     least: T,
     most: T,
@@ -41,7 +42,7 @@ impl<T: Real> SizeRange<T> {
         Self { least: T::from_f64(f64::INFINITY), most: T::ZERO }
     }
 
-    /// Zero and what is not finite says nothing.
+    /// Adds a size; zero and non-finite sizes are ignored.
     fn add(&mut self, size: T) {
         if size > T::ZERO && size.is_finite() {
             self.least = size.min(self.least);
@@ -49,26 +50,26 @@ impl<T: Real> SizeRange<T> {
         }
     }
 
-    /// Whether one is none of them.
+    /// Returns whether all sizes are far from one, on the same side.
     fn needs_scaling(&self) -> bool {
         let near = T::from_f64(WELL_SCALED_RANGE);
         self.most > T::ZERO && (self.least > near || self.most * near < T::ONE)
     }
 }
 
-/// A unit that is not too far from one; one where nothing is known.
+/// Returns a size as a unit, limited to a range around one; one for an unknown size.
 fn unit<T: Real>(size: T) -> T {
     let farthest = T::from_f64(MAX_UNIT);
     if size > T::ZERO && size.is_finite() { size.min(farthest).max(T::ONE / farthest) } else { T::ONE }
 }
 
 /// A mean of sizes.
-struct Mean<T> {
+struct MeanSize<T> {
     sum: T,
     count: usize,
 }
 
-impl<T: Real> Mean<T> {
+impl<T: Real> MeanSize<T> {
     const NO_SIZES: Self = Self { sum: T::ZERO, count: 0 };
 
     fn add(&mut self, size: T) {
@@ -88,7 +89,7 @@ impl<T: Real> Mean<T> {
 struct ScalingBounds<T> {
     lower: T,
     upper: T,
-    /// Soft bounds may mean none.
+    /// Whether both bounds are hard; soft bounds may be far away.
     hard: bool,
     no_bound: T,
 }
@@ -101,7 +102,7 @@ impl<T: Real> ScalingBounds<T> {
             T::from_f64(f64::INFINITY)
         }
     }
-    /// Of zero.
+    /// Returns the distance of the bounds from zero.
     fn distance(&self) -> T {
         self.lower.max(-self.upper).max(T::ZERO)
     }
@@ -111,13 +112,14 @@ impl<T: Real> ScalingBounds<T> {
     }
 }
 
-/// Finds the units of all rows, and that of the objective; nothing if all are near one.
+/// Computes the units of all rows and returns that of the objective; none if all sizes are near
+/// one.
 #[inline(never)]
-pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
+pub fn find<T: Real>(qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>, rows: &mut [T]) -> Option<T> {
     let objective = objective_unit(qp, reading, rows)?;
     let mut far = SizeRange { least: objective, most: objective }.needs_scaling();
     let root = objective.sqrt();
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let (here, next) = rows.split_at_mut_checked(place.row + place.rows).unwrap_or_default();
         let (variables, general) =
             part_mut(here, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
@@ -127,7 +129,7 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
             sizes.add(size);
             limits.sizes().into_iter().for_each(|size| sizes.add(size));
             far |= sizes.needs_scaling();
-            // Without a curvature there is only the room, where it is narrow.
+            // A variable without curvature has the size of a narrow range between its bounds.
             let (size, room) = (if size.is_finite() { size } else { T::ONE }, limits.bound_range());
             let room = T::from_f64(MAX_UNIT_PER_RANGE) * room;
             *row = unit(if T::ZERO < room && room < size { room } else { size });
@@ -141,7 +143,7 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
             far |= SizeRange { least: size, most: size }.needs_scaling();
             *row = unit(size);
         }
-        // A state that costs nothing anywhere is as large as what leads to it.
+        // A state without any cost has the size of its dynamics.
         let dynamics = part(qp.data, place.data, place.next * place.ld);
         let states = next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1)));
         for (root_of_state, column) in states.filter(|(root, _)| **root == T::ZERO) {
@@ -155,14 +157,21 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
     far.then_some(objective)
 }
 
-/// The unit of the objective, and the roots of all curvatures; nothing of a linear program.
-fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
-    let (mut gains, mut rooms) = (Mean::NO_SIZES, SizeRange::new());
+/// Returns the unit of the objective, and writes the square roots of all curvatures; none for a
+/// linear program.
+fn objective_unit<T: Real>(
+    qp: QpView<'_, T>,
+    reading: &ConstraintInterpretation<T>,
+    rows: &mut [T],
+) -> Option<T> {
+    let (mut gains, mut rooms) = (MeanSize::NO_SIZES, SizeRange::new());
     let mut any = false;
-    for place in Places::<T>::new(qp.dims).rev() {
+    for place in StageOffsetsIter::<T>::new(qp.dims).rev() {
         any |= curvatures(qp, &place, rows, &mut gains);
-        let roots = part(rows, place.row, place.n);
-        for ((limits, &root), slope) in stage_bounds(qp, &place, reading).zip(roots).zip(slopes(qp, &place)) {
+        let sqrt_curvatures = part(rows, place.row, place.n);
+        for ((limits, &root), slope) in
+            stage_bounds(qp, &place, reading).zip(sqrt_curvatures).zip(slopes(qp, &place))
+        {
             let room = limits.bound_range();
             rooms.add(root * room);
             gains.add(root * limits.distance());
@@ -172,16 +181,21 @@ fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [
             }
         }
     }
-    // Where there is little to gain, at a point of rest, it is what the least room costs, but for
-    // problems with units near one.
+    // At a stationary point the gain is small: then the unit is the cost of the narrowest range, at
+    // most one.
     let gain = gains.squared_mean();
     let most = gain.max(if rooms.most > T::ZERO { rooms.least * rooms.least } else { T::ZERO });
     any.then(|| unit(gain.max(most.min(T::ONE))))
 }
 
-/// The roots of the curvatures of a stage, and whether there is one; offsets of the dynamics cost
-/// something at the next stage.
-fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], gains: &mut Mean<T>) -> bool {
+/// Writes the square roots of the curvatures of a stage, and returns whether there is one; offsets
+/// of the dynamics have a cost at the next stage.
+fn curvatures<T: Real>(
+    qp: QpView<'_, T>,
+    place: &StageOffsets,
+    rows: &mut [T],
+    objective_gains: &mut MeanSize<T>,
+) -> bool {
     let StageOffsets { n, ld, row, .. } = *place;
     let data = part(qp.data, place.data, place.data_len());
     let (here, behind) = rows.split_at_mut_checked(row + place.rows).unwrap_or_default();
@@ -197,16 +211,16 @@ fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], 
         set(here, row + j, curvature.sqrt());
     }
     for (&offset, &root) in part(data, place.offset(), place.next).iter().zip(roots) {
-        gains.add(offset.abs() * root);
+        objective_gains.add(offset.abs() * root);
     }
     any
 }
 
-/// The bounds of the variables of a stage.
+/// Returns the bounds of the variables of a stage.
 fn stage_bounds<T: Real>(
     qp: QpView<'_, T>,
     place: &StageOffsets,
-    reading: &Reading<T>,
+    reading: &ConstraintInterpretation<T>,
 ) -> impl Iterator<Item = ScalingBounds<T>> {
     let no_bound = reading.no_bound;
     let bound = |row| part(qp.data, place.data + place.constraint_vector_begin(row), place.n).iter();
@@ -218,7 +232,7 @@ fn stage_bounds<T: Real>(
     })
 }
 
-/// The sizes of the gradient of a stage.
+/// Returns the magnitudes of the gradient of a stage.
 fn slopes<'a, T: Real>(qp: QpView<'a, T>, place: &StageOffsets) -> impl Iterator<Item = T> + use<'a, T> {
     part(qp.data, place.data + place.gradient(), place.n).iter().map(|slope| slope.abs())
 }

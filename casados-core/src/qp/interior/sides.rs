@@ -1,66 +1,65 @@
-//! The sides of constraints that exist, in one list over the whole horizon.
+//! The inequalities (sides) of all constraints, in one list over the whole horizon.
 //!
 //! A side is a row (a variable, or a general constraint) and a sign: `σ (c v − bound) + e = s ≥ 0`
-//! with a multiplier `λ ≥ 0`. Lower sides come first, then upper ones. A soft side has a violation
-//! `e ≥ 0` with a multiplier `ν ≥ 0` of its own; these pairs `(e, ν)` lie behind the pairs
-//! `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds that are hard
-//! are an equation, with a multiplier without sign.
+//! with a multiplier `λ ≥ 0`. Lower sides precede upper ones. A soft side has a violation `e ≥ 0`
+//! with its own multiplier `ν ≥ 0`; the pairs `(e, ν)` follow the pairs `(s, λ)`, so that
+//! operations on all pairs need no distinction. Two equal hard bounds are an equation, with a
+//! multiplier of either sign.
 
 use super::units::Units;
 use crate::qp::element::set;
-use crate::qp::layout::{Places, part, take_mut};
+use crate::qp::layout::{StageOffsetsIter, part, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
-/// What violations of bounds cost.
+/// The penalties of violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PenaltyMode {
-    /// What the problem says.
+    /// Those of the problem.
     Given,
-    /// Nothing where the problem says what; one for each unit, linearly, where the bound is hard.
-    /// Bounds of controls, which are more often what nature gives than what somebody wants, cost
-    /// ten times as much.
+    /// Hard bounds get a linear penalty of one per unit, bounds of controls, which are more often
+    /// physical limits, ten; soft bounds are ignored.
     Hard,
 }
 
-/// How constraints are read.
+/// The interpretation of constraints.
 #[derive(Clone, Copy, Debug)]
-pub struct Reading<T> {
-    /// Whether the state at the start is given, and is no constraint.
+pub struct ConstraintInterpretation<T> {
+    /// Whether the initial state is fixed, and no constraint.
     pub fixed: bool,
     pub penalties: PenaltyMode,
-    /// Bounds from here on mean that there is none.
+    /// Bounds of at least this magnitude are no bounds.
     pub no_bound: T,
 }
 
-/// How many there are.
+/// Numbers of sides and equations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Lower sides.
     pub lower: usize,
     /// Upper sides.
     pub upper: usize,
-    /// Soft ones among them.
+    /// Soft sides.
     pub soft: usize,
     /// Equations.
     pub equations: usize,
 }
 
 impl Counts {
-    /// All sides.
+    /// Returns the number of all sides.
     pub const fn sides(&self) -> usize {
         self.lower + self.upper
     }
-    /// All pairs of complementary variables.
+    /// Returns the number of all pairs of complementary variables.
     pub const fn pair_count(&self) -> usize {
         self.sides() + self.soft
     }
-    /// How many numbers the arrays take.
-    pub const fn numbers(&self) -> usize {
+    /// Returns the length of the arrays.
+    pub const fn memory_len(&self) -> usize {
         8 * self.pair_count() + 3 * self.sides() + 4 * self.equations + 2 * self.soft
     }
-    /// How many indices the lists take.
+    /// Returns the length of the lists of indices.
     pub const fn indices(&self) -> usize {
         2 * self.sides() + self.equations + self.soft
     }
@@ -72,12 +71,12 @@ struct Constraint<T> {
     control: bool,
     lower: T,
     upper: T,
-    /// Linear and quadratic.
+    /// Linear and quadratic penalty.
     lower_penalty: (T, T),
     upper_penalty: (T, T),
 }
 
-/// What one side of a constraint is.
+/// The kind of a side.
 enum Kind<T> {
     Absent,
     Hard,
@@ -89,7 +88,7 @@ fn kind<T: Real>(penalty: Option<T>, (linear, quadratic): (T, T), absent: bool) 
         return Kind::Absent;
     }
     match penalty {
-        // A violation that costs nothing is allowed.
+        // A violation without cost is allowed.
         None if linear.is_finite() && linear == T::ZERO && quadratic == T::ZERO => Kind::Absent,
         None if linear.is_finite() => Kind::Soft(linear, quadratic),
         None => Kind::Hard,
@@ -98,7 +97,7 @@ fn kind<T: Real>(penalty: Option<T>, (linear, quadratic): (T, T), absent: bool) 
     }
 }
 
-/// Whether the state at the start is given: hard and equal bounds of every component.
+/// Returns whether the initial state is fixed: hard and equal bounds of every component.
 pub fn is_initial_state_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
     let Some(stage) = qp.stage(0) else { return true };
     let b = stage.x_bounds();
@@ -106,9 +105,9 @@ pub fn is_initial_state_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
     equal && b.lower_linear.iter().chain(b.upper_linear).all(|p| !p.is_finite())
 }
 
-/// Calls `f` for every constraint of the horizon that is not the given state at the start.
+/// Calls `f` for every constraint of the horizon except a fixed initial state.
 fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constraint<T>)) {
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let vector = |row| part(data, place.constraint_vector_begin(row), place.rows);
         let bounds = vector(ConstraintVector::Lower).iter().zip(vector(ConstraintVector::Upper));
@@ -131,14 +130,14 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 }
 
 impl<T: Real> Constraint<T> {
-    /// Whether it is an equation, and otherwise its sides.
-    fn equation_or_sides(&self, reading: &Reading<T>) -> (bool, Kind<T>, Kind<T>) {
+    /// Returns whether it is an equation, and otherwise the kinds of its sides.
+    fn equation_or_sides(&self, reading: &ConstraintInterpretation<T>) -> (bool, Kind<T>, Kind<T>) {
         let ten = T::from_f64(10.0);
         let penalty = match reading.penalties {
             PenaltyMode::Given => None,
             PenaltyMode::Hard => Some(if self.control { ten } else { T::ONE }),
         };
-        // What is NaN is no bound either; the data is checked before.
+        // NaN is no bound; the data is checked before.
         let (is_lower, is_upper) = (self.lower > -reading.no_bound, self.upper < reading.no_bound);
         let lower = kind(penalty, self.lower_penalty, !is_lower);
         let upper = kind(penalty, self.upper_penalty, !is_upper);
@@ -147,8 +146,8 @@ impl<T: Real> Constraint<T> {
     }
 }
 
-/// How many sides there are.
-pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
+/// Returns the numbers of sides and equations.
+pub fn count<T: Real>(qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>) -> Counts {
     let mut counts = Counts::default();
     constraints(qp, reading.fixed, |constraint| {
         let (equation, lower, upper) = constraint.equation_or_sides(reading);
@@ -164,66 +163,66 @@ pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
     counts
 }
 
-/// All sides, and what an interior point keeps of each.
+/// All inequalities, and the data of the interior point for each.
 pub struct Inequalities<'a, T> {
     pub counts: Counts,
-    /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the
-    /// regularisation of the dual, in units.
-    pub compliance: T,
+    /// The dual regularisation `δ`, in units: the change of the distance of a side or equation per
+    /// change of its multiplier.
+    pub dual_regularisation: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],
     /// Rows of equations.
     pub equations: &'a mut [u32],
-    /// Sides that are soft.
+    /// The soft sides.
     pub soft: &'a mut [u32],
-    /// What sides are to a method of active sets.
+    /// The activity of the sides, for active sets.
     pub activity: &'a mut [u32],
     /// Slacks `s` of sides, then violations `e`.
     pub slack: &'a mut [T],
     /// Multipliers `λ`, then `ν`.
     pub multiplier: &'a mut [T],
-    /// `σ (c v − bound) + e − s`; behind the sides zero
+    /// `σ (c v − bound) + e − s`; zero for violations.
     pub residual: &'a mut [T],
     /// Changes of slacks.
     pub slack_step: &'a mut [T],
     /// Changes of multipliers.
     pub multiplier_step: &'a mut [T],
-    /// `1 / (s + δ λ)`, with `δ` zero of violations.
+    /// `1 / (s + δ λ)`, with `δ = 0` for violations.
     pub inverse: &'a mut [T],
-    /// What `s Δλ + λ Δs` is to be, over `s + δ λ`.
+    /// The target of `s Δλ + λ Δs`, over `s + δ λ`.
     pub target: &'a mut [T],
-    /// Room for something.
+    /// Workspace.
     pub scratch: &'a mut [T],
-    /// What a side adds to the Hessian.
+    /// The weights of the sides in the Hessian.
     pub weight: &'a mut [T],
-    /// How much softer a side is than `δ`: the square of its unit over that of the objective.
-    pub softness: &'a mut [T],
+    /// The factor of `δ` for each side: the square of its unit over that of the objective.
+    pub regularisation_scale: &'a mut [T],
     /// Bounds.
     pub bound: &'a mut [T],
     /// Linear penalties of soft sides.
     pub linear: &'a mut [T],
     /// Quadratic penalties of soft sides.
     pub quadratic: &'a mut [T],
-    /// Multipliers of equations.
-    pub free: &'a mut [T],
+    /// Multipliers of equations, of either sign.
+    pub equation_multipliers: &'a mut [T],
     /// `c v − bound` of equations.
     pub equation_residual: &'a mut [T],
     /// Right-hand sides of equations.
     pub equation_bound: &'a mut [T],
-    /// How much stiffer equations are than `1 / δ`.
-    pub stiffness: &'a mut [T],
-    /// Changes of multipliers of equations, where they are remembered: by what equations give way,
-    /// Newton's equations are solved again from these.
-    pub free_step: &'a mut [T],
+    /// The factor of `1 / δ` for each equation.
+    pub stiffness_scale: &'a mut [T],
+    /// Changes of multipliers of equations, for iterative refinement: Newton's equations with the
+    /// dual regularisation are solved again from these.
+    pub equation_multiplier_steps: &'a mut [T],
 }
 
 impl<'a, T: Real> Inequalities<'a, T> {
-    /// In memory whose contents stay.
+    /// The arrays in memory, whose contents are kept.
     pub fn new(counts: Counts, numbers: &mut &'a mut [T], indices: &mut &'a mut [u32]) -> Self {
         let (pairs, sides) = (counts.pair_count(), counts.sides());
         Self {
             counts,
-            compliance: T::ZERO,
+            dual_regularisation: T::ZERO,
             rows: take_mut(indices, sides),
             equations: take_mut(indices, counts.equations),
             soft: take_mut(indices, counts.soft),
@@ -237,20 +236,20 @@ impl<'a, T: Real> Inequalities<'a, T> {
             target: take_mut(numbers, pairs),
             scratch: take_mut(numbers, pairs),
             weight: take_mut(numbers, sides),
-            softness: take_mut(numbers, sides),
+            regularisation_scale: take_mut(numbers, sides),
             bound: take_mut(numbers, sides),
             linear: take_mut(numbers, counts.soft),
             quadratic: take_mut(numbers, counts.soft),
-            free: take_mut(numbers, counts.equations),
+            equation_multipliers: take_mut(numbers, counts.equations),
             equation_residual: take_mut(numbers, counts.equations),
             equation_bound: take_mut(numbers, counts.equations),
-            stiffness: take_mut(numbers, counts.equations),
-            free_step: &mut [],
+            stiffness_scale: take_mut(numbers, counts.equations),
+            equation_multiplier_steps: &mut [],
         }
     }
 
-    /// Lists the sides of a problem that has so many: rows, bounds and penalties.
-    pub fn list(&mut self, qp: QpView<'_, T>, reading: &Reading<T>) {
+    /// Lists the sides of a problem: rows, bounds and penalties.
+    pub fn list(&mut self, qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>) {
         let list = self;
         let (mut lower, mut upper, mut soft, mut equations) = (0, list.counts.lower, 0, 0);
         constraints(qp, reading.fixed, |constraint| {
@@ -259,7 +258,7 @@ impl<'a, T: Real> Inequalities<'a, T> {
             if equation {
                 set(list.equations, equations, row);
                 set(list.equation_bound, equations, constraint.lower);
-                set(list.stiffness, equations, T::ONE);
+                set(list.stiffness_scale, equations, T::ONE);
                 equations += 1;
                 return;
             }
@@ -275,24 +274,24 @@ impl<'a, T: Real> Inequalities<'a, T> {
                 if !matches!(kind, Kind::Absent) {
                     set(list.rows, *at, row);
                     set(list.bound, *at, bound);
-                    set(list.softness, *at, T::ONE);
+                    set(list.regularisation_scale, *at, T::ONE);
                     *at += 1;
                 }
             }
         });
     }
 
-    /// What sides and equations give way is measured in units, and so are penalties that are those
-    /// of no user.
+    /// Scales the dual regularisation by the units, and with `own_penalties` also the penalties of
+    /// [`PenaltyMode::Hard`].
     pub fn set_units(&mut self, units: Units<'_, T>, own_penalties: bool) {
         if units.rows.is_empty() {
             return;
         }
-        for (softness, &row) in self.softness.iter_mut().zip(&*self.rows) {
+        for (softness, &row) in self.regularisation_scale.iter_mut().zip(&*self.rows) {
             let unit = units.of(row as usize);
             *softness = unit * unit / units.objective;
         }
-        for (stiffness, &row) in self.stiffness.iter_mut().zip(&*self.equations) {
+        for (stiffness, &row) in self.stiffness_scale.iter_mut().zip(&*self.equations) {
             let unit = units.of(row as usize);
             *stiffness = units.objective / (unit * unit);
         }

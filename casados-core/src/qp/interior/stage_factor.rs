@@ -1,4 +1,4 @@
-//! The factors of a stage.
+//! The factorisation of a stage.
 
 use super::cholesky::{Pivots, cholesky};
 use super::kernels::{Columns, Part, Source, add_rows, copy, mirror, product};
@@ -9,7 +9,7 @@ use crate::qp::layout::{StageOffsets, padded_len, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Riccati<'_, T> {
-    /// `M`, its factors, and `P`.
+    /// Computes `M`, its factors, and `P`.
     #[inline(always)]
     pub fn factor_stage<E: Packed<T>>(
         &mut self,
@@ -52,7 +52,7 @@ impl<T: Real> Riccati<'_, T> {
         let source = Source::Matrix(Columns { data: before, ld });
         product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
         if indefinite {
-            // What has a negative pivot was subtracted, and is to be added.
+            // Columns with a negative pivot were subtracted, but must be added.
             let inverse = part(self.inverse, place.v + nx, nu);
             let columns = panel.data.chunks_exact(ld.max(1)).zip(inverse);
             for (column, _) in columns.filter(|(_, inverse)| **inverse < T::ZERO) {
@@ -85,8 +85,8 @@ impl<T: Real> Riccati<'_, T> {
         }
     }
 
-    /// `M`: of the controls' columns everything but what is above the diagonal among controls, of
-    /// the states' the lower triangle.
+    /// Assembles `M`: the columns of controls except the upper triangle among controls, and the
+    /// lower triangle of the columns of states.
     #[inline(always)]
     fn assemble<E: Packed<T>>(&mut self, place: &StageOffsets, equations: &Equations<'_, T>) {
         let StageOffsets { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
@@ -105,14 +105,14 @@ impl<T: Real> Riccati<'_, T> {
             }
         }
         let w = Columns { data: &*self.w, ld };
-        // Columns are computed four at a time. The first with a control among them are needed
-        // whole.
+        // Columns are computed in groups of four. The first group with a control is computed
+        // completely.
         let whole = nx / 4 * 4;
         if stage > 0 || first != InitialStateKind::Fixed {
             product::<T, E>(self.m, ld, source, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
         product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);
-        // Of the Hessian only the lower triangle is there: above are controls times states.
+        // The Hessian has its lower triangle only; the mixed block is controls times states.
         let mixed = part_mut(self.m, nx * ld, nu * ld);
         add_rows::<T, E>(mixed, hessian.get(nx..).unwrap_or_default(), ld, [nu, nx]);
         let mut largest = self.largest;

@@ -4,8 +4,8 @@ use crate::qp::error::{QpError, QpField};
 #[cfg(feature = "alloc")]
 use crate::qp::memory::CACHE_LINE;
 
-/// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that
-/// grows when a larger problem comes and never shrinks.
+/// Memory of a solver: an array or slice, or, with the feature `alloc`, a `Vec` that grows for
+/// larger problems and never shrinks.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -40,10 +40,10 @@ use crate::qp::memory::CACHE_LINE;
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
 pub trait Store<T>: AsRef<[T]> + AsMut<[T]> {
-    /// At least so many elements.
+    /// Returns at least `length` elements.
     ///
     /// # Errors
-    /// [`QpError::Dimension`] or [`QpError::OutOfMemory`] if there are less.
+    /// [`QpError::Dimension`] or [`QpError::OutOfMemory`] if there are fewer.
     #[doc(hidden)]
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError>;
 }
@@ -68,7 +68,7 @@ impl<T> Store<T> for &mut [T] {
 #[cfg(feature = "alloc")]
 impl<T: Copy + Default> Store<T> for alloc::vec::Vec<T> {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError> {
-        // Whole registers are read from the begin of a cache line on.
+        // Whole registers are read from the start of a cache line.
         let line = CACHE_LINE / size_of::<T>().max(1);
         crate::qp::memory::try_resize(self, length.saturating_add(line))?;
         let begin = self.as_ptr().align_offset(CACHE_LINE).min(line);

@@ -1,5 +1,5 @@
-//! Symmetric indefinite systems of a few variables: `P A Pᵀ = L D Lᵀ` with blocks of one and two
-//! pivots.
+//! Factorisation of small symmetric indefinite matrices: `P A Pᵀ = L D Lᵀ` with pivots of one and
+//! two rows.
 //!
 //! Bunch and Kaufman, "Some stable methods for calculating inertia and solving symmetric linear
 //! systems", Math. Comp. 31 (1977).
@@ -15,23 +15,23 @@ const ALPHA: f64 = 0.640_388_203_202_207_6;
 /// The signs of the eigenvalues.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inertia {
-    /// Negative ones.
+    /// The number of negative eigenvalues.
     pub negative: usize,
-    /// Pivots that vanished, whose unknowns stay zero.
+    /// The number of vanishing pivots, whose unknowns are set to zero.
     pub vanished: usize,
 }
 
-/// Factors, in the memory of the matrix, whose lower triangle lies column after column.
+/// The factors, in the memory of the matrix, whose lower triangle is stored column after column.
 #[derive(Clone, Copy, Debug)]
 pub struct Symmetric<'a, T> {
     a: &'a [T],
     n: usize,
-    /// For every pivot the row that it was exchanged with, counted from one; of pairs with the sign
-    /// minus.
+    /// For every pivot the index of the row it was exchanged with, counted from one; negative for
+    /// pairs.
     exchanged: &'a [T],
 }
 
-/// A factorisation on its way.
+/// A factorisation in progress.
 struct BunchKaufman<'a, T> {
     a: &'a mut [T],
     n: usize,
@@ -39,24 +39,24 @@ struct BunchKaufman<'a, T> {
     inertia: Inertia,
 }
 
-/// An element of the matrix.
+/// Returns an element of the matrix.
 fn element<T: Real>(a: &[T], n: usize, row: usize, column: usize) -> T {
     let (row, column) = if row < column { (column, row) } else { (row, column) };
     a.get(column * n + row).copied().unwrap_or(T::ZERO)
 }
 
-/// The inverse of a block of two pivots times a vector.
+/// Returns the inverse of a block of two pivots times a vector.
 fn solve_2x2_block<T: Real>(a: &[T], n: usize, k: usize, [x, y]: [T; 2]) -> [T; 2] {
     let at = |i, j| element(a, n, i, j);
     let (a, b, c) = (at(k, k), at(k + 1, k), at(k + 1, k + 1));
-    // Divided by `b` first: its square may not be a number.
+    // Division by `b` first avoids overflow of its square.
     let (a, c) = (a / b, c / b);
     let determinant = b * (a * c - T::ONE);
     [(c * x - y) / determinant, (a * y - x) / determinant]
 }
 
 impl<T: Real> BunchKaufman<'_, T> {
-    /// Pivots below `noise` times the largest element vanish.
+    /// Factorises; pivots below `noise` times the largest element vanish.
     fn factorise(&mut self, noise: T) {
         let n = self.n;
         let mut largest = T::ZERO;
@@ -81,7 +81,7 @@ impl<T: Real> BunchKaufman<'_, T> {
         set(self.a, column * self.n + row, value);
     }
 
-    /// The largest element of a column from some row on, without that of the diagonal.
+    /// Returns the largest off-diagonal element of a column, from row `from` on, and its row.
     fn largest_off_diagonal(&self, column: usize, from: usize) -> (usize, T) {
         let mut found = (from, T::ZERO);
         for row in from..self.n {
@@ -93,7 +93,7 @@ impl<T: Real> BunchKaufman<'_, T> {
         found
     }
 
-    /// Chooses and eliminates the next one or two pivots; how many.
+    /// Chooses and eliminates the next one or two pivots; returns their number.
     fn eliminate(&mut self, k: usize, small: T) -> usize {
         let alpha = T::from_f64(ALPHA);
         let (row, below) = self.largest_off_diagonal(k, k + 1);
@@ -120,8 +120,7 @@ impl<T: Real> BunchKaufman<'_, T> {
         2
     }
 
-    /// Exchanges two unknowns, of which the first is the smaller one, in the part that is left and
-    /// in `L`.
+    /// Exchanges two unknowns, `k < other`, in the remaining matrix and in `L`.
     fn exchange(&mut self, k: usize, other: usize) {
         if k == other {
             return;
@@ -131,7 +130,7 @@ impl<T: Real> BunchKaufman<'_, T> {
                 continue;
             }
             let (a, b) = (self.get(k, j), self.get(other, j));
-            // Left of the diagonal these are rows of `L`, elsewhere of the matrix.
+            // Left of the diagonal are rows of `L`, elsewhere elements of the matrix.
             self.set(k, j, b);
             self.set(other, j, a);
         }
@@ -173,7 +172,7 @@ impl<T: Real> BunchKaufman<'_, T> {
         self.exchange(k + 1, row);
         set(self.exchanged, k, -T::from_whole(k + 1));
         set(self.exchanged, k + 1, -T::from_whole(row + 1));
-        // Its determinant is negative: one eigenvalue of each sign.
+        // The determinant is negative: one eigenvalue of each sign.
         self.inertia.negative += 1;
         let n = self.n;
         for j in k + 2..n {
@@ -192,14 +191,15 @@ impl<T: Real> BunchKaufman<'_, T> {
 }
 
 impl<'a, T: Real> Symmetric<'a, T> {
-    /// Factorises a matrix. Pivots below `noise` times the largest element vanish.
+    /// Factorises a matrix, and returns its inertia. Pivots below `noise` times the largest element
+    /// vanish.
     pub fn factor(a: &mut [T], n: usize, exchanged: &mut [T], noise: T) -> Inertia {
         let mut elimination = BunchKaufman { a, n, exchanged, inertia: Inertia::default() };
         elimination.factorise(noise);
         elimination.inertia
     }
 
-    /// What [`Symmetric::factor`] has left in its memory.
+    /// The factors that [`Symmetric::factor`] left in this memory.
     pub fn new(a: &'a [T], n: usize, exchanged: &'a [T]) -> Self {
         Self { a, n, exchanged }
     }
@@ -208,12 +208,12 @@ impl<'a, T: Real> Symmetric<'a, T> {
         element(self.a, self.n, row, column)
     }
 
-    /// Whether a pivot is one of two.
+    /// Returns whether a pivot belongs to a pair.
     fn is_2x2_pivot(&self, k: usize) -> bool {
         self.exchanged.get(k).is_some_and(|&e| e < T::ZERO)
     }
 
-    /// The row that a pivot was exchanged with.
+    /// Returns the row that a pivot was exchanged with.
     fn exchanged_row(&self, k: usize) -> usize {
         self.exchanged.get(k).map_or(k, |e| (e.abs().to_f64() as usize).saturating_sub(1))
     }
@@ -278,8 +278,7 @@ mod tests {
     use alloc::vec::Vec;
     use nalgebra::{DMatrix, DVector};
 
-    /// Random symmetric matrices, with zero diagonals among them: residual, and inertia by
-    /// eigenvalues.
+    /// Random symmetric matrices, also with zero diagonals: residuals, and inertia by eigenvalues.
     #[test]
     fn solves_and_counts() {
         let mut seed = 1u64;

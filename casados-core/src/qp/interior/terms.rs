@@ -1,19 +1,19 @@
-//! What residuals are sums of: what rounding leaves of them is a part of it.
+//! The terms of residuals, whose rounding errors bound the accuracy of the residuals.
 
 use super::vector::largest_magnitude_ignoring_nan;
 use crate::qp::statistics;
 use crate::scalar::{Packed, Real};
 
-/// What residuals are sums of.
+/// The largest terms of residuals.
 #[derive(Clone, Copy)]
 pub struct Terms<T> {
-    /// In gradients: `H v`, `h`, forces of constraints, `π`.
-    pub forces: T,
-    /// In conditions: `v`, `C x + D u`, `b`.
-    pub values: T,
+    /// Terms of gradients: `H v`, `h`, gradients of constraints, `π`.
+    pub gradient_terms: T,
+    /// Terms of conditions: `v`, `C x + D u`, `b`.
+    pub condition_terms: T,
 }
 
-/// The largest terms in units, and as they are.
+/// The largest terms, in units and without units.
 #[derive(Clone, Copy)]
 pub struct LargestTerms<T> {
     pub in_units: T,
@@ -23,13 +23,13 @@ pub struct LargestTerms<T> {
 impl<T: Real> LargestTerms<T> {
     pub const NONE: Self = LargestTerms { in_units: T::ZERO, own: T::ZERO };
 
-    /// Terms that are multiplied by units.
+    /// Adds terms of gradients, which are multiplied by units.
     #[inline(always)]
     pub fn add_forces<E: Packed<T>>(&mut self, all: &[T], units: &[T]) {
         self.update_both_scalings::<E>(all, units, |term, unit| term * unit);
     }
 
-    /// Terms that are divided by units.
+    /// Adds terms of conditions, which are divided by units.
     #[inline(always)]
     pub fn add_values<E: Packed<T>>(&mut self, all: &[T], units: &[T]) {
         self.update_both_scalings::<E>(all, units, |term, unit| term / unit);

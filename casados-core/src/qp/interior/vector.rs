@@ -1,16 +1,16 @@
-//! Sums and extremes over long vectors, in registers.
+//! Sums and extrema of long vectors, by SIMD.
 
 use crate::qp::statistics;
 use crate::scalar::{Packed, Real};
 
-/// Whole registers of a slice, and the rest.
+/// Splits slices into whole registers and the remainder.
 macro_rules! split {
     ($slice:expr) => {
         (E::cells($slice), $slice.get($slice.len() / E::LANES * E::LANES..).unwrap_or_default())
     };
 }
 
-/// `Σ a b`
+/// Returns `Σ a b`.
 #[inline(always)]
 pub fn dot<T: Real, E: Packed<T>>(a: &[T], b: &[T]) -> T {
     let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
@@ -23,7 +23,7 @@ pub fn dot<T: Real, E: Packed<T>>(a: &[T], b: &[T]) -> T {
     a_rest.iter().zip(b_rest).fold(whole, |sum, (&a, &b)| sum + a * b)
 }
 
-/// The largest `a b`, at least `least`. NaN is not seen.
+/// Returns the largest `a b`, at least `least`. NaN is ignored.
 #[inline(always)]
 pub fn largest_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
     let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
@@ -35,7 +35,7 @@ pub fn largest_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (a * b).max(largest))
 }
 
-/// The largest `−a / b`, at least `least`.
+/// Returns the largest `−a / b`, at least `least`.
 #[inline(always)]
 pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
     let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
@@ -47,7 +47,7 @@ pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T])
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a / b)).max(largest))
 }
 
-/// The largest `|a|`, at least `least`. NaN is not seen.
+/// Returns the largest `|a|`, at least `least`. NaN is ignored.
 #[inline(always)]
 pub fn largest_magnitude_ignoring_nan<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
     let (a, rest) = split!(all);
@@ -59,21 +59,21 @@ pub fn largest_magnitude_ignoring_nan<T: Real, E: Packed<T>>(least: T, all: &[T]
     rest.iter().fold(whole, |largest, a| a.abs().max(largest))
 }
 
-/// The largest of `|a|` in units, at least `least`; NaN if one of them is.
+/// Returns the largest `|a|` in units, at least `least`; NaN if one element is NaN.
 #[inline(never)]
 pub fn largest_scaled_magnitude<T: Real>(least: T, all: &[T], units: &[T], measure: fn(T, T) -> T) -> T {
     all.iter().zip(units).fold(least, |most, (a, &unit)| statistics::nan_max(most, measure(a.abs(), unit)))
 }
 
-/// The largest `|a|`; NaN if one of them is, or if their squares overflow.
+/// Returns the largest `|a|`; NaN if one element is NaN, or if their squares overflow.
 #[inline(always)]
 pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
     let largest = largest_magnitude_ignoring_nan::<T, E>(T::ZERO, all);
-    // What is compared with NaN does not show it: sums do.
+    // Comparisons ignore NaN; sums do not.
     if dot::<T, E>(all, all).is_finite() { largest } else { T::from_f64(f64::NAN) }
 }
 
-/// `a + factor · b`
+/// Computes `a + factor · b`.
 #[inline(always)]
 pub fn add_scaled<T: Real>(a: &mut [T], factor: T, b: &[T]) {
     for (a, &b) in a.iter_mut().zip(b) {
@@ -81,7 +81,7 @@ pub fn add_scaled<T: Real>(a: &mut [T], factor: T, b: &[T]) {
     }
 }
 
-/// `factor · a`
+/// Computes `factor · a`.
 #[inline(always)]
 pub fn scale_vector<T: Real>(a: &mut [T], factor: T) {
     for a in a {

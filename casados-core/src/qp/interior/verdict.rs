@@ -1,4 +1,4 @@
-//! What is said of a problem that has no solution, and why that is true.
+//! Certificates of infeasibility.
 
 use super::iterate::Iterate;
 use super::limits::ResidualTolerances;
@@ -9,45 +9,45 @@ use crate::qp::layout::{copy_common, part};
 use crate::qp::statistics::nan_max;
 use crate::scalar::{Packed, Real};
 
-/// Of double precision `ε` is below.
+/// An upper bound of `ε` of double precision.
 const DOUBLE_PRECISION_EPSILON: f64 = 1e-10;
 
-/// Multipliers that have grown so much, where violations stay, may be a certificate.
+/// The growth of multipliers from which a certificate is tested, while violations persist.
 const GROWTH: f64 = 10.0;
-/// Numbers of feasible points that are not ruled out, over those of the iterate: enough for a
-/// suspicion.
+/// The factor of the size of the iterate up to which a suspicion excludes feasible points.
 const SUSPICION_FACTOR: f64 = 1e2;
-/// The iterations before the first test.
+/// The number of iterations before the first test.
 const MIN_ITERATIONS_BEFORE_TEST: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
-    /// Whether multipliers of the run with the objective are nearly a certificate: where no point
-    /// satisfies all constraints they grow without bound in its direction, since what the objective
-    /// adds to the gradient is bounded. `known` is how large forces were at first.
+    /// Returns whether the multipliers of a run with the objective are nearly a certificate: the
+    /// multipliers of an infeasible problem grow without bound in the direction of a certificate,
+    /// since the gradient of the objective is bounded. `known` is the initial size of gradient
+    /// terms.
     #[inline(always)]
     pub fn suspects_infeasibility<E: Packed<T>>(
         &mut self,
         iterations: usize,
-        known: T,
+        initial_multiplier_size: T,
         (residuals, limits): (MaxResiduals<T>, &ResidualTolerances<T>),
         multipliers: &mut [T],
     ) -> bool {
-        let values = limits.of(self.terms).values;
+        let values = limits.of(self.terms).condition_terms;
         let violates = residuals.inequalities > values || residuals.dynamics > values;
         if iterations < MIN_ITERATIONS_BEFORE_TEST
             || !violates
-            || self.largest_multiplier() < T::from_f64(GROWTH) * known
+            || self.largest_multiplier() < T::from_f64(GROWTH) * initial_multiplier_size
         {
             return false;
         }
-        // Soft bounds contradict nothing: their forces belong to the objective.
-        let sides = &mut self.sides;
+        // Soft bounds are no part of a certificate: their multipliers belong to the objective.
+        let sides = &mut self.inequalities;
         copy_common(sides.multiplier_step, sides.multiplier);
         for &side in &*sides.soft {
             set(sides.multiplier, side as usize, T::ZERO);
         }
-        // Weights are those of the next step, which is still to come: until then the gradient with
-        // the objective is kept in their place. Of the dynamics and of bounds residuals are known.
+        // `weights` holds the gradient with the objective until the next step computes weights.
+        // The residuals of dynamics and bounds are already evaluated.
         copy_common(self.weights, self.stationarity);
         let (objective, terms, own_terms) = (self.objective, self.terms, self.own_terms);
         self.objective = false;
@@ -56,30 +56,30 @@ impl<T: Real> Iterate<'_, T> {
         let suspicious = self.is_certificate::<E>(T::from_f64(SUSPICION_FACTOR), multipliers);
         (self.objective, self.terms, self.own_terms) = (objective, terms, own_terms);
         copy_common(self.stationarity, self.weights);
-        copy_common(self.sides.multiplier, self.sides.multiplier_step);
+        copy_common(self.inequalities.multiplier, self.inequalities.multiplier_step);
         if !suspicious && self.coupling.is_some() {
-            // Multipliers of couplings are what the gradient without the objective has left.
+            // Multipliers of couplings are the residual of the gradient without the objective.
             let _ = self.evaluate::<E>(multipliers);
         }
         suspicious
     }
 
-    /// The largest multiplier of a side or an equation in units.
+    /// Returns the largest multiplier of a side or an equation in units.
     fn largest_multiplier(&self) -> T {
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         let of_sides = sides.multiplier.iter().zip(&*sides.rows);
-        let of_equations = sides.free.iter().zip(&*sides.equations);
+        let of_equations = sides.equation_multipliers.iter().zip(&*sides.equations);
         let forces = of_sides.chain(of_equations);
         let unit = |row: u32| self.measure.of(row as usize);
         let most = forces.fold(T::ZERO, |most, (force, &row)| (force.abs() * unit(row)).max(most));
         most / self.measure.objective
     }
 
-    /// Whether the multipliers are a certificate (Farkas' lemma). Without objective the Lagrangian
-    /// `L(v) = Σ π (A v + b − v₊) − Σ λ d(v)` is not positive at any point that satisfies all
-    /// constraints, and differs from what it is here by its gradient `g` times the distance: where
-    /// `g` vanishes and `L` is positive there is none. With a `g` that is small there is none but
-    /// where numbers are 1e5 times (of single precision a hundred times) as large as here.
+    /// Returns whether the multipliers are a certificate (Farkas' lemma). Without the objective the
+    /// Lagrangian `L(v) = Σ π (A v + b − v₊) − Σ λ d(v)` is not positive at any feasible point, and
+    /// its gradient `g` is constant: if `g` vanishes and `L` is positive at one point, there is no
+    /// feasible point. If `g` is small, feasible points must be larger than the iterate by a factor
+    /// of 1e5 (100 in single precision).
     #[inline(always)]
     pub fn proves_infeasibility<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
         let _ = self.evaluate::<E>(multipliers);
@@ -89,21 +89,22 @@ impl<T: Real> Iterate<'_, T> {
         )
     }
 
-    /// The same of an iterate that was evaluated, where numbers may be `far` times as large.
+    /// The same test for an evaluated iterate, for points up to `size_factor` times as large.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline(never))]
-    fn is_certificate<E: Packed<T>>(&self, far: T, multipliers: &[T]) -> bool {
-        let count = self.sides.counts.sides();
-        let (forces, distances) = (part(self.sides.multiplier, 0, count), part(self.sides.scratch, 0, count));
+    fn is_certificate<E: Packed<T>>(&self, size_factor: T, multipliers: &[T]) -> bool {
+        let count = self.inequalities.counts.sides();
+        let (forces, distances) =
+            (part(self.inequalities.multiplier, 0, count), part(self.inequalities.scratch, 0, count));
         let mut lagrangian = dot::<T, E>(multipliers, self.dynamics)
             - dot::<T, E>(forces, distances)
-            - dot::<T, E>(self.sides.free, self.sides.equation_residual);
+            - dot::<T, E>(self.inequalities.equation_multipliers, self.inequalities.equation_residual);
         if let Some(coupling) = &self.coupling {
             lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
         }
         let gradient = self.max_gradient::<E>(self.measure);
-        let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
-        let gradient = nan_max(gradient * far, rounding);
-        lagrangian > gradient * (T::ONE + self.terms.values)
+        let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.gradient_terms;
+        let gradient = nan_max(gradient * size_factor, rounding);
+        lagrangian > gradient * (T::ONE + self.terms.condition_terms)
     }
 }

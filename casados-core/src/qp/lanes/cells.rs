@@ -1,6 +1,6 @@
-//! Products of small dense matrices whose elements are registers: one problem in each lane.
+//! Products of small dense matrices whose elements are registers, with a problem in each lane.
 //!
-//! Matrices lie column after column. Everything is inlined into the function that was compiled for
+//! Matrices are stored column after column. Everything is inlined into the function compiled for
 //! `E`.
 
 use crate::qp::layout::copy_common;
@@ -9,7 +9,7 @@ use crate::scalar::{Lanes, Scalar};
 /// An element in memory.
 pub type Cell<E> = <E as Scalar>::Cell;
 
-/// A matrix to be read, and the distance of its columns.
+/// A read-only matrix, and the stride of its columns.
 pub struct Matrix<'a, C> {
     pub data: &'a [C],
     pub ld: usize,
@@ -22,17 +22,17 @@ impl<C> Clone for Matrix<'_, C> {
 }
 impl<C> Copy for Matrix<'_, C> {}
 
-/// What a product is subtracted from.
+/// The minuend of a product.
 #[derive(Clone, Copy)]
 pub enum Start<'a, C> {
     Zero,
-    /// What is there.
+    /// The target itself.
     Itself,
     Matrix(Matrix<'a, C>),
 }
 
-/// As many columns of a tile as leave room in the registers: sixteen sums where there are
-/// thirty-two of them, eight elsewhere.
+/// Returns the number of columns of a tile: sixteen accumulators with thirty-two registers,
+/// otherwise eight.
 const fn tile_columns<E>() -> usize {
     if cfg!(target_arch = "x86_64") && size_of::<E>() < 64 { 2 } else { 4 }
 }
@@ -81,8 +81,8 @@ fn tile<E: Lanes, const R: usize, const C: usize>(
     }
 }
 
-/// `to (rows × columns) = start − X (rows × depth) Y (columns × depth)ᵀ`; with `lower` nothing
-/// above the diagonal counts.
+/// Computes `to (rows × columns) = start − X (rows × depth) Y (columns × depth)ᵀ`; with `lower`
+/// elements above the diagonal are undefined.
 #[inline(always)]
 pub fn product<E: Lanes>(
     (to, ld): (&mut [Cell<E>], usize),
@@ -132,7 +132,7 @@ pub fn product<E: Lanes>(
     }
 }
 
-/// `to −= X v`
+/// Computes `to −= X v`.
 #[inline(always)]
 pub fn subtract<E: Lanes>(
     to: &mut [Cell<E>],
@@ -143,7 +143,7 @@ pub fn subtract<E: Lanes>(
     product::<E>((to, rows), Start::Itself, (x, Matrix { data: v, ld: 1 }), [rows, 1, depth], false);
 }
 
-/// `to −= Xᵀ v`, an element for each column; four sums at once.
+/// Computes `to −= Xᵀ v`, an element for each column, with four accumulators.
 #[inline(always)]
 pub fn subtract_transposed<E: Lanes>(to: &mut [Cell<E>], x: Matrix<'_, Cell<E>>, v: &[Cell<E>]) {
     let mut columns = x.data.chunks_exact(x.ld.max(1));
@@ -178,7 +178,7 @@ pub fn subtract_transposed<E: Lanes>(to: &mut [Cell<E>], x: Matrix<'_, Cell<E>>,
     }
 }
 
-/// `to −= a x`
+/// Computes `to −= a x`.
 #[inline(always)]
 pub fn subtract_scaled<E: Lanes>(to: &mut [Cell<E>], a: E, x: &[Cell<E>]) {
     for (to, x) in to.iter_mut().zip(x) {
@@ -186,7 +186,7 @@ pub fn subtract_scaled<E: Lanes>(to: &mut [Cell<E>], a: E, x: &[Cell<E>]) {
     }
 }
 
-/// `x *= a`
+/// Computes `x *= a`.
 #[inline(always)]
 pub fn scale<E: Lanes>(x: &mut [Cell<E>], a: E) {
     for x in x {
@@ -194,7 +194,7 @@ pub fn scale<E: Lanes>(x: &mut [Cell<E>], a: E) {
     }
 }
 
-/// `to = −x`
+/// Computes `to = −x`.
 #[inline(always)]
 pub fn assign_negated<E: Lanes>(to: &mut [Cell<E>], x: &[Cell<E>]) {
     for (to, x) in to.iter_mut().zip(x) {
@@ -202,7 +202,7 @@ pub fn assign_negated<E: Lanes>(to: &mut [Cell<E>], x: &[Cell<E>]) {
     }
 }
 
-/// What is below the diagonal of a square matrix above it, too.
+/// Copies the lower triangle of a square matrix to the upper one.
 #[inline(always)]
 pub fn mirror<C: Copy>(matrix: &mut [C], n: usize) {
     for j in 0..n {

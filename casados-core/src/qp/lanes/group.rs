@@ -1,14 +1,14 @@
-//! A group of problems, one in each lane, and the solution of their equations for given sets of
-//! active bounds.
+//! A group of problems, one in each lane, and the solution of their equations for given active
+//! sets.
 //!
 //! ```text
 //! M = H + [A B]ᵀ P₊ [A B],  m = g + [A B]ᵀ (p₊ + P₊ b)        of a control at a bound: its row is u = bound
 //! M_uu = L Lᵀ,  K = M_xu L⁻ᵀ,  P = M_xx − K Kᵀ,  p = m_x − K L⁻¹ m_u
 //! ```
 //!
-//! as [`interior::riccati`](super::super::interior) has it; then states and controls forwards, and
-//! multipliers backwards, with the gradients in the controls: of a control at a bound it is its
-//! multiplier, of others what is left of the equations.
+//! as in [`interior::riccati`](super::super::interior), followed by a forward sweep for states and
+//! controls and a backward sweep for multipliers. The gradient by a control at a bound is its
+//! multiplier; for other controls it is the residual.
 
 use super::cells::{
     Matrix, Start, assign_negated, mirror, product, scale, subtract, subtract_scaled, subtract_transposed,
@@ -16,11 +16,11 @@ use super::cells::{
 use crate::qp::layout::{StageDims, copy_common, part, part_mut, take_mut};
 use crate::scalar::Lanes;
 
-/// Pivots below this part of the diagonal that they are left of may be rounding errors: such a
+/// The ratio of a pivot to its diagonal element below which it may be a rounding error: such a
 /// problem leaves the group.
-const WEAK: f64 = 1e-7;
+const SMALL_PIVOT: f64 = 1e-7;
 
-/// The dimensions of problems that can be in one group: all stages alike.
+/// The dimensions of the problems of a group; all stages are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub nx: usize,
@@ -29,7 +29,8 @@ pub struct Size {
 }
 
 impl Size {
-    /// Of stages that are alike, without general constraints, the last one without controls.
+    /// Returns the size if all stages have equal dimensions, without general constraints, and the
+    /// last one has no controls.
     pub fn of(dims: &[StageDims]) -> Option<Self> {
         let (last, before) = dims.split_last()?;
         let StageDims { nx, nu, .. } = *before.first()?;
@@ -44,7 +45,7 @@ impl Size {
     pub const fn n(&self) -> usize {
         self.nx + self.nu
     }
-    /// How many cells a group takes.
+    /// Returns the number of cells of a group.
     pub const fn cells(&self) -> usize {
         let (Self { nx, nu, intervals }, n) = (*self, self.n());
         (intervals + 1) * (n * n + 2 * n + nx)
@@ -57,34 +58,34 @@ impl Size {
     }
 }
 
-/// The data of a group, its sets, and its point; arrays over the horizon.
+/// The data of a group, its active sets, and its point; arrays over the horizon.
 pub struct Group<'m, C> {
     pub size: Size,
     /// `[A B]ᵀ`, a column for each next state.
     pub dynamics: &'m mut [C],
-    /// Both triangles; of the last stage rows of controls are zero.
+    /// Both triangles; at the last stage the rows of controls are zero.
     pub hessian: &'m mut [C],
     pub gradient: &'m mut [C],
     /// `b`
     pub offset: &'m mut [C],
     pub lower: &'m mut [C],
     pub upper: &'m mut [C],
-    /// Which bound a control is at: −1 the lower, 1 the upper, 0 none.
+    /// The active bound of a control: −1 for the lower, 1 for the upper, 0 for none.
     pub active: &'m mut [C],
     /// `(x, u)`
     pub v: &'m mut [C],
-    /// `π` of the dynamics that lead to a stage; at the first one the gradient in its state.
+    /// `π` of the dynamics of the previous stage; at the first stage the gradient by its state.
     pub multipliers: &'m mut [C],
-    /// The gradient of the Lagrangian in the controls, without multipliers of their bounds.
+    /// The gradient of the Lagrangian by the controls, without multipliers of their bounds.
     pub slope: &'m mut [C],
-    /// Whether a pivot was weak: above zero.
-    pub weak: &'m mut [C],
+    /// Nonzero if a pivot is weak.
+    pub has_small_pivot: &'m mut [C],
     /// `(K; L)`
     panels: &'m mut [C],
     /// Reciprocals of pivots, and `L⁻¹ m_u`.
     inverse: &'m mut [C],
     y: &'m mut [C],
-    /// Of the stage at work: `P`, `−[A B]ᵀ P`, `M`, `m`, `−(p + P b)`.
+    /// Of the current stage: `P`, `−[A B]ᵀ P`, `M`, `m`, `−(p + P b)`.
     p: &'m mut [C],
     w: &'m mut [C],
     m: &'m mut [C],
@@ -93,7 +94,7 @@ pub struct Group<'m, C> {
 }
 
 impl<'m, C: Copy> Group<'m, C> {
-    /// In memory of [`Size::cells`].
+    /// A group in memory of [`Size::cells`].
     pub fn new(size: Size, mut memory: &'m mut [C]) -> Self {
         let (Size { nx, nu, intervals }, n) = (size, size.n());
         let memory = &mut memory;
@@ -110,7 +111,7 @@ impl<'m, C: Copy> Group<'m, C> {
             v: take((intervals + 1) * n),
             multipliers: take((intervals + 1) * nx),
             slope: take(intervals * nu),
-            weak: take(1),
+            has_small_pivot: take(1),
             panels: take(intervals * n * nu),
             inverse: take(intervals * nu),
             y: take(intervals * nu),
@@ -122,7 +123,7 @@ impl<'m, C: Copy> Group<'m, C> {
         }
     }
 
-    /// The solution for the sets of active bounds.
+    /// Computes the solution for the active sets.
     #[inline(always)]
     pub fn solve<E: Lanes<Cell = C>>(&mut self) {
         self.backward::<E>();
@@ -130,7 +131,7 @@ impl<'m, C: Copy> Group<'m, C> {
         self.dynamics_multipliers::<E>();
     }
 
-    /// The recursion, and which pivots are weak.
+    /// Sweeps backward, and detects weak pivots.
     #[inline(always)]
     pub fn backward<E: Lanes<Cell = C>>(&mut self) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
@@ -158,13 +159,13 @@ impl<'m, C: Copy> Group<'m, C> {
             product::<E>((self.p, nx), start, (panel, panel), [nx, nx, nu], true);
             mirror(self.p, nx);
         }
-        for to in self.weak.iter_mut() {
+        for to in self.has_small_pivot.iter_mut() {
             weak.store(to);
         }
     }
 
-    /// Columns of controls as a panel. A control at a bound has the row and column of the identity:
-    /// what it does to the others is in their gradients.
+    /// Copies the columns of controls to a panel. A control at a bound gets the row and column of
+    /// the identity; its effect on other controls is in their gradients.
     #[inline(always)]
     fn fix_active<E: Lanes<Cell = C>>(&mut self, k: usize) {
         let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
@@ -172,7 +173,7 @@ impl<'m, C: Copy> Group<'m, C> {
         for (c, column) in panel.chunks_exact_mut(n.max(1)).enumerate() {
             let of_controls = part(self.m, (nx + c) * n, n);
             for (i, to) in column.iter_mut().enumerate() {
-                // Above the diagonal there is nothing.
+                // Only the lower triangle is stored.
                 let from = if i >= nx + c { of_controls.get(i) } else { self.m.get(i * n + nx + c) };
                 if let Some(&from) = from {
                     *to = from;
@@ -208,11 +209,11 @@ impl<'m, C: Copy> Group<'m, C> {
         }
     }
 
-    /// Eliminates the controls of a stage; above zero where a pivot was weak.
+    /// Eliminates the controls of a stage; returns a nonzero number where a pivot is weak.
     #[inline(always)]
     fn eliminate<E: Lanes<Cell = C>>(&mut self, k: usize) -> E {
         let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
-        let (zero, one, part_of) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(WEAK));
+        let (zero, one, part_of) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(SMALL_PIVOT));
         let panel = part_mut(self.panels, k * n * nu, n * nu);
         let inverse = part_mut(self.inverse, k * nu, nu);
         let y = part_mut(self.y, k * nu, nu);
@@ -248,7 +249,7 @@ impl<'m, C: Copy> Group<'m, C> {
             let (here, next) = self.v.split_at_mut_checked((k + 1) * n).unwrap_or_default();
             let here = part_mut(here, k * n, n);
             let (x, controls) = here.split_at_mut_checked(nx).unwrap_or_default();
-            // Lᵀ u = −(y + Kᵀ x)
+            // `Lᵀ u = −(y + Kᵀ x)`
             assign_negated::<E>(controls, part(self.y, k * nu, nu));
             let panels = Matrix { data: panel, ld: n };
             subtract_transposed::<E>(controls, panels, x);
@@ -270,7 +271,7 @@ impl<'m, C: Copy> Group<'m, C> {
         }
     }
 
-    /// Multipliers of the dynamics, and slopes.
+    /// Computes the multipliers of the dynamics, and the slopes.
     #[inline(always)]
     fn dynamics_multipliers<E: Lanes<Cell = C>>(&mut self) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());

@@ -1,22 +1,20 @@
-//! Problems side by side, one in each lane of registers: those that need nothing else than active
-//! bounds of controls.
+//! Problems solved side by side in SIMD lanes: those whose only bounds are bounds of controls.
 //!
 //! | | |
 //! | --- | --- |
-//! | `group` | as many problems as there are lanes, and their equations for given sets |
-//! | `sets` | which bounds are active, and what is left of the conditions |
-//! | `transfer` | problems into lanes, and solutions back |
+//! | `group` | a problem in each lane, and the solution for given active sets |
+//! | `sets` | active sets, and residuals of the optimality conditions |
+//! | `transfer` | transfer of problems into lanes, and of solutions back |
 //! | `cells` | products of matrices of registers |
 //!
-//! The method is Newton's for `min(s, λ) = 0`, as that of [`interior::active`](super::interior): M.
+//! The method is Newton's for `min(s, λ) = 0`, as in [`interior::active`](super::interior) (M.
 //! Hintermüller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a semismooth Newton
-//! method", SIAM J. Optim. 13 (2002), begun without active bounds, or with those of a warm start. A
-//! problem of this kind has a feasible point, and where all pivots are positive one solution.
+//! method", SIAM J. Optim. 13, 2002), started without active bounds, or with those of a warm start.
+//! A problem of this kind has a feasible point and, if all pivots are positive, a unique solution.
 //!
-//! Lanes that are done wait no longer than until half of a group is: then those that are left form
-//! new groups, each with its set. A problem whose sets do not settle, with a weak pivot or with
-//! numbers that are not finite is left to be solved alone, by all that a single solve can do: what
-//! is said of it is what a single solve says.
+//! Finished lanes idle until half of a group is finished; then the remaining problems form new
+//! groups, each with its active set. A problem whose sets do not settle, with a weak pivot or with
+//! non-finite numbers is solved alone afterwards, with all features and errors of a single solve.
 
 mod cells;
 mod group;
@@ -26,7 +24,7 @@ mod transfer;
 use super::error::QpError;
 use super::instance::QpInstance;
 use super::interior::{InteriorPointOptions, is_initial_state_fixed};
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::memory::{try_reserve, try_resize};
 use super::solver::QpStart;
 use super::stage::ConstraintVector;
@@ -40,33 +38,38 @@ pub use group::Size;
 use sets::LaneResiduals;
 use transfer::MAX_LANES;
 
-/// Sets that are tried: of problems whose sets settle at all nearly all need less.
+/// The maximum number of active sets; nearly all problems whose sets settle need fewer.
 const MAX_ACTIVE_SETS: usize = 16;
-/// What a group may take of the second-level cache.
+/// The fraction of the second-level cache that a group may use.
 const CACHE_FRACTION: f64 = 5.0 / 8.0;
-/// Residuals are below this part of the tolerance: a single solve is as good, or better, in units.
+/// The fraction of the tolerance for residuals: a single solve is as accurate, or more so in units.
 const TOLERANCE_FRACTION: f64 = 0.1;
 
 /// The memory of groups.
 #[derive(Clone, Debug)]
 pub struct LaneWorkspace<T> {
     numbers: Vec<T>,
-    /// Sets of active bounds of all problems.
+    /// Active sets of all problems.
     sets: Vec<i8>,
-    /// The problems that are not solved.
+    /// Indices of the problems that are not solved yet.
     pending: Vec<u32>,
-    /// Those of them that are to be solved alone.
-    alone: Vec<u32>,
+    /// Indices of the problems to be solved alone.
+    left_for_single_solves: Vec<u32>,
 }
 
 impl<T> Default for LaneWorkspace<T> {
     fn default() -> Self {
-        Self { numbers: Vec::new(), sets: Vec::new(), pending: Vec::new(), alone: Vec::new() }
+        Self {
+            numbers: Vec::new(),
+            sets: Vec::new(),
+            pending: Vec::new(),
+            left_for_single_solves: Vec::new(),
+        }
     }
 }
 
-/// The dimensions of a problem that can be solved side by side with others: the state at the start
-/// is given, others have no bounds, those of controls are hard and not equal.
+/// Returns the dimensions of a problem that can be solved side by side with others: its initial
+/// state is fixed, other states have no bounds, bounds of controls are hard and not equal.
 pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -> Option<Size> {
     let QpInstance { qp, solution } = instance;
     let qp = qp.view();
@@ -76,11 +79,11 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
         return None;
     }
     let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let variables = if place.next > 0 { place.n } else { place.nx };
         let vector = |row| part(qp.data, place.data + place.constraint_vector_begin(row), variables);
         let (lower, upper) = (vector(ConstraintVector::Lower), vector(ConstraintVector::Upper));
-        // No branch for each number.
+        // Evaluated without a branch for each number.
         let mut good = true;
         for (&lower, &upper) in lower.iter().zip(upper) {
             good &= (lower <= upper) & (lower < infinity) & (upper > -infinity);
@@ -114,7 +117,7 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
     Some(size)
 }
 
-/// Solves problems of one size, as [`size`] has it; those that are left are in [`Together::alone`].
+/// Solves problems of one size, as by [`size`]; the unsolved ones are in [`LaneWorkspace::alone`].
 ///
 /// # Errors
 /// [`QpError::OutOfMemory`]
@@ -125,11 +128,11 @@ pub fn solve<T: Real>(
     (options, start): (&InteriorPointOptions, QpStart),
 ) -> Result<(), QpError> {
     let count = problems.0.len();
-    // One register more, so that the first one may begin at a line of the cache.
+    // One more register, to align the first one to a cache line.
     let length = size.cells().saturating_add(1).saturating_mul(MAX_LANES);
     try_resize(&mut together.numbers, length)?;
     try_resize(&mut together.sets, count.saturating_mul(size.intervals * size.nu))?;
-    for list in [&mut together.pending, &mut together.alone] {
+    for list in [&mut together.pending, &mut together.left_for_single_solves] {
         list.clear();
         try_reserve(list, count)?;
     }
@@ -139,13 +142,13 @@ pub fn solve<T: Real>(
 }
 
 impl<T> LaneWorkspace<T> {
-    /// The problems of the last call that are to be solved alone.
+    /// Returns the problems of the last call that must be solved alone.
     pub fn unsolved_indices(&self) -> impl Iterator<Item = usize> {
-        self.alone.iter().map(|&index| index as usize)
+        self.left_for_single_solves.iter().map(|&index| index as usize)
     }
 }
 
-/// See [`solve`].
+/// The arguments of [`solve`].
 pub struct Solve<'r, T: Real> {
     together: &'r mut LaneWorkspace<T>,
     size: Size,
@@ -164,7 +167,7 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
     fn run<E: Packed<T>>(mut self) {
         let bytes = self.size.cells().saturating_mul(size_of::<E::Cell>());
         if E::LANES < 2 || bytes as f64 > CACHE_FRACTION * second_level_cache() as f64 {
-            core::mem::swap(&mut self.together.pending, &mut self.together.alone);
+            core::mem::swap(&mut self.together.pending, &mut self.together.left_for_single_solves);
             return;
         }
         let mut numbers = core::mem::take(&mut self.together.numbers);
@@ -184,7 +187,7 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
 }
 
 impl<T: Real> Solve<'_, T> {
-    /// Goes through what is pending, group by group.
+    /// Iterates on all pending problems, group by group.
     #[inline(always)]
     fn iterate_pending<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, first: bool) {
         let (count, mut kept) = (self.together.pending.len(), 0);
@@ -198,7 +201,7 @@ impl<T: Real> Solve<'_, T> {
             self.load_problems::<E>(group, indices);
             let mut convex = (1u32 << members) - 1;
             if first && self.start == QpStart::Warm {
-                convex = self.convex::<E>(group, indices);
+                convex = self.convex_lanes::<E>(group, indices);
             }
             self.load_active_sets::<E>(group, indices, first);
             let left = self.iterate::<E>(group, indices, convex, count > E::LANES);
@@ -215,7 +218,7 @@ impl<T: Real> Solve<'_, T> {
         self.together.pending.truncate(kept);
     }
 
-    /// Writes problems into the lanes; lanes that are left hold the last one once more.
+    /// Writes problems into the lanes; unused lanes repeat the last problem.
     #[inline(always)]
     fn load_problems<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize]) {
         let mut data: [&[T]; MAX_LANES] = [&[]; MAX_LANES];
@@ -229,24 +232,25 @@ impl<T: Real> Solve<'_, T> {
         group.write::<T, E>(dims, &data, self.options.no_bound);
     }
 
-    /// The lanes whose problems are convex, a bit for each: their pivots without active bounds say
-    /// so. A cold start begins with these. Others are left to be solved alone.
+    /// Returns the lanes with convex problems, as bits: their pivots without active bounds are not
+    /// weak. A cold start begins with this test. The other problems are left to be solved alone.
     #[inline(always)]
-    fn convex<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
+    fn convex_lanes<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
         group.backward::<E>();
-        let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
+        let weak =
+            group.has_small_pivot.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
         let mut convex = 0;
         for (lane, (&index, &weak)) in indices.iter().zip(&weak).enumerate() {
             if weak == 0.0 {
                 convex |= 1 << lane;
             } else {
-                self.together.alone.push(index as u32);
+                self.together.left_for_single_solves.push(index as u32);
             }
         }
         convex
     }
 
-    /// Writes the sets that the problems begin with: those of a group before, or of a warm start.
+    /// Writes the initial active sets: those of the previous group, or of a warm start.
     #[inline(always)]
     fn load_active_sets<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
         let Size { nx, nu, intervals } = self.size;
@@ -257,7 +261,7 @@ impl<T: Real> Solve<'_, T> {
             } else if let (QpStart::Warm, Some(instance)) = (self.start, self.problems.0.get(index)) {
                 let least = T::from_f64(self.options.tolerance);
                 let [lower, upper] = instance.solution.sides();
-                let places = Places::<T>::new(instance.qp.dims()).take(intervals);
+                let places = StageOffsetsIter::<T>::new(instance.qp.dims()).take(intervals);
                 let rows = places.flat_map(|place| place.row + nx..place.row + nx + nu);
                 let is_at = |side: &[T], row: usize| side.get(row).is_some_and(|&force| force > least);
                 let set = rows.map(|row| i8::from(is_at(upper, row)) - i8::from(is_at(lower, row)));
@@ -266,8 +270,8 @@ impl<T: Real> Solve<'_, T> {
         }
     }
 
-    /// Iterates on some lanes until all their problems are solved or given up, or, where others
-    /// are waiting, until half of the group is. The lanes that are left, a bit for each.
+    /// Iterates on the lanes in `left` until all their problems are solved or given up, or, if
+    /// others are pending, until half of the group is. Returns the remaining lanes, as bits.
     #[inline(always)]
     fn iterate<E: Packed<T>>(
         &mut self,
@@ -280,7 +284,8 @@ impl<T: Real> Solve<'_, T> {
         loop {
             group.solve::<E>();
             let changes = lanes::<T, E>(group.update_active_sets::<E>(tolerance));
-            let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
+            let weak =
+                group.has_small_pivot.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
             let mut settled = 0;
             let going = left;
             for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| going >> lane & 1 == 1) {
@@ -292,7 +297,7 @@ impl<T: Real> Solve<'_, T> {
                     settled |= 1 << lane;
                 } else if changes.is_nan() || *weak != 0.0 || is_over {
                     left &= !(1 << lane);
-                    self.together.alone.push(index as u32);
+                    self.together.left_for_single_solves.push(index as u32);
                 }
             }
             if settled != 0 {
@@ -305,10 +310,10 @@ impl<T: Real> Solve<'_, T> {
         }
     }
 
-    /// Judges and stores solutions of lanes whose sets have settled.
+    /// Evaluates and stores the solutions of lanes whose sets have settled.
     #[inline(always)]
     fn store<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize], settled: u32) {
-        let LaneResiduals { stationarity, dynamics, inequalities, objective } = group.judge::<E>();
+        let LaneResiduals { stationarity, dynamics, inequalities, objective } = group.residuals::<E>();
         let of = [stationarity, dynamics, inequalities, objective].map(|value| lanes::<T, E>(value));
         for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| settled >> lane & 1 == 1) {
             let [stationarity, dynamics, inequalities, objective] =
@@ -318,7 +323,7 @@ impl<T: Real> Solve<'_, T> {
             let problem = (self.problems.0.get_mut(index), self.problems.1.get_mut(index));
             let (Some(instance), Some(Ok(statistics))) = problem else { return };
             if !(is_small && objective.is_finite()) {
-                self.together.alone.push(index as u32);
+                self.together.left_for_single_solves.push(index as u32);
                 continue;
             }
             let iterations = statistics.iterations;
@@ -335,7 +340,7 @@ impl<T: Real> Solve<'_, T> {
     }
 }
 
-/// The numbers of the lanes.
+/// Returns the numbers of the lanes.
 #[inline(always)]
 fn lanes<T: Real, E: Packed<T>>(register: E) -> [f64; MAX_LANES] {
     let mut cell: E::Cell = bytemuck::Zeroable::zeroed();

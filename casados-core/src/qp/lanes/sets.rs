@@ -1,24 +1,25 @@
-//! Which bounds are active, and what is left of the conditions of optimality.
+//! Active sets, and residuals of the optimality conditions.
 
 use super::cells::{Cell, Matrix, assign_negated, subtract, subtract_transposed};
 use super::group::{Group, Size};
 use crate::qp::layout::{part, part_mut};
 use crate::scalar::{Lanes, Scalar};
 
-/// What is known of the problems of a group, by lanes.
+/// The residuals of the problems of a group, by lanes.
 pub struct LaneResiduals<E> {
-    /// Gradient of the Lagrangian with multipliers that are not negative, and of the dynamics.
+    /// The gradient of the Lagrangian with nonnegative multipliers, including those of the
+    /// dynamics.
     pub stationarity: E,
     pub dynamics: E,
-    /// By how much bounds are violated.
+    /// The largest violation of bounds.
     pub inequalities: E,
     pub objective: E,
 }
 
 impl<C: Copy> Group<'_, C> {
-    /// Controls become active where they violate a bound, and cease to be where its multiplier is
-    /// negative, both by more than the tolerance. Returns how many changed; NaN where numbers are
-    /// not finite.
+    /// Updates the active sets: controls become active if they violate a bound, and inactive if its
+    /// multiplier is negative, both by more than the tolerance. Returns the number of changes; NaN
+    /// for non-finite numbers.
     #[inline(always)]
     pub fn update_active_sets<E: Lanes<Cell = C>>(&mut self, tolerance: E) -> E {
         let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
@@ -35,7 +36,8 @@ impl<C: Copy> Group<'_, C> {
                 let (lower, upper) = (E::load(lower), E::load(upper));
                 let at_upper = E::select(E::lt(upper + tolerance, u), one, zero);
                 let of_free = E::select(E::lt(u, lower - tolerance), -one, at_upper);
-                // A multiplier is the slope at a lower bound, its negative at an upper one.
+                // The multiplier of a lower bound is the slope, of an upper bound the negative
+                // slope.
                 let pulls = E::lt(tolerance, before * slope);
                 let of_active = E::select(pulls, zero, before);
                 let after = E::select(Scalar::eq(before, zero), of_free, of_active);
@@ -47,16 +49,17 @@ impl<C: Copy> Group<'_, C> {
         E::select(sum.is_finite(), changes, E::from_f64(f64::NAN))
     }
 
-    /// What is left of the conditions of optimality, computed from the data, and the objective.
+    /// Returns the residuals of the optimality conditions, evaluated from the data, and the
+    /// objective.
     #[inline(always)]
-    pub fn judge<E: Lanes<Cell = C>>(&mut self) -> LaneResiduals<E> {
+    pub fn residuals<E: Lanes<Cell = C>>(&mut self) -> LaneResiduals<E> {
         let zero = E::from_f64(0.0);
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         let (mut stationarity, mut dynamics, mut inequalities, mut objective) = (zero, zero, zero, zero);
         for k in 0..=intervals {
             let v = part(self.v, k * n, n);
             let variables = if k < intervals { n } else { nx };
-            // H v
+            // `H v`
             for g in &mut *self.g {
                 zero.store(g);
             }
@@ -74,7 +77,7 @@ impl<C: Copy> Group<'_, C> {
                 let matrix = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
                 assign_negated::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
                 subtract::<E>(self.g, matrix, self.minus, [n, nx]);
-                // x₊ − b − A x − B u
+                // `x₊ − b − A x − B u`
                 let gap = part_mut(self.minus, 0, nx);
                 let next = part(self.v, (k + 1) * n, nx).iter().zip(part(self.offset, k * nx, nx));
                 for (gap, (next, offset)) in gap.iter_mut().zip(next) {
@@ -102,7 +105,7 @@ impl<C: Copy> Group<'_, C> {
         LaneResiduals { stationarity, dynamics, inequalities, objective }
     }
 
-    /// Bounds that are none become infinite.
+    /// Replaces bounds of at least the magnitude `no_bound` by infinite ones.
     #[inline(always)]
     pub fn remove_absent_bounds<E: Lanes<Cell = C>>(&mut self, no_bound: E) {
         let infinity = E::from_f64(f64::INFINITY);
@@ -114,7 +117,7 @@ impl<C: Copy> Group<'_, C> {
     }
 }
 
-/// The multipliers of both bounds of a control, which are not negative.
+/// Returns the nonnegative multipliers of both bounds of a control.
 #[inline(always)]
 pub fn forces<E: Lanes>(active: &Cell<E>, slope: E) -> [E; 2] {
     let (zero, active) = (E::from_f64(0.0), E::load(active));

@@ -1,18 +1,18 @@
-//! Problems into the lanes of registers, and solutions back.
+//! Transfer of problems into SIMD lanes, and of solutions back.
 
 use super::group::{Group, Size};
 use super::sets::forces;
-use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::stage::ConstraintVector;
 use crate::qp::{StageDims, element::set};
 use crate::scalar::{Packed, Real};
 
-/// More lanes than any register has.
+/// An upper bound of the number of lanes.
 pub const MAX_LANES: usize = 16;
 
-/// Elements of several slices from `begin` on, one slice in each lane: whole registers are read
-/// from each, and transposed.
+/// Copies elements of several slices from `begin` on, one slice for each lane: whole registers are
+/// read from each, and transposed.
 #[inline(always)]
 fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MAX_LANES], begin: usize, to: &mut [E::Cell]) {
     for (block, to) in to.chunks_mut(E::LANES).enumerate() {
@@ -25,7 +25,7 @@ fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MAX_LANES], begin: usize, to: &mu
             match E::cells(part(from, at, E::LANES)) {
                 [cell] => *register = E::load(cell),
                 _ => {
-                    // Behind the end there is nothing.
+                    // Elements beyond the end are zero.
                     let mut cell = zero::<T, E>();
                     for (i, value) in from.get(at..).unwrap_or_default().iter().take(E::LANES).enumerate() {
                         E::set_lane(&mut cell, i, value.to_f64());
@@ -47,7 +47,7 @@ fn zero<T: Real, E: Packed<T>>() -> E::Cell {
 }
 
 impl<C: Copy> Group<'_, C> {
-    /// Writes problems of these dimensions, given by their data, into lanes; no bound is active.
+    /// Writes problems of these dimensions, given by their data, into lanes, with no active bound.
     #[inline(always)]
     pub fn write<T: Real, E: Packed<T, Cell = C>>(
         &mut self,
@@ -56,7 +56,7 @@ impl<C: Copy> Group<'_, C> {
         no_bound: f64,
     ) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
-        for (k, place) in Places::<T>::new(dims).enumerate() {
+        for (k, place) in StageOffsetsIter::<T>::new(dims).enumerate() {
             let begin = place.data;
             let variables = if k < intervals { n } else { nx };
             let hessian = part_mut(self.hessian, k * n * n, n * n);
@@ -102,7 +102,7 @@ impl<C: Copy> Group<'_, C> {
         self.remove_absent_bounds::<E>(E::from_f64(no_bound));
     }
 
-    /// Writes a set of active bounds into a lane, of those that there are.
+    /// Writes an active set into a lane; bounds that do not exist are left out.
     #[inline(always)]
     pub fn load_active_set<T: Real, E: Packed<T, Cell = C>>(
         &mut self,
@@ -116,7 +116,7 @@ impl<C: Copy> Group<'_, C> {
         }
     }
 
-    /// The set of active bounds of a lane.
+    /// Reads the active set of a lane.
     #[inline(always)]
     pub fn store_active_set<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, to: &mut [i8]) {
         for (to, active) in to.iter_mut().zip(&*self.active) {
@@ -125,7 +125,7 @@ impl<C: Copy> Group<'_, C> {
         }
     }
 
-    /// The point of a lane, and its multipliers.
+    /// Reads the point of a lane, and its multipliers.
     #[inline(always)]
     pub fn read<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, solution: &mut SolutionView<'_, T>) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
@@ -135,12 +135,12 @@ impl<C: Copy> Group<'_, C> {
         };
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
-        for (k, place) in Places::<T>::new(solution.dims).enumerate() {
+        for (k, place) in StageOffsetsIter::<T>::new(solution.dims).enumerate() {
             let StageOffsets { v, dynamics, row, .. } = place;
             let variables = if k < intervals { n } else { nx };
             copy(part_mut(solution.v, v, variables), part(self.v, k * n, variables));
             if k == 0 {
-                // The state is given: its force has either sign.
+                // The initial state is fixed: its multiplier has either sign.
                 for (i, force) in part(self.multipliers, 0, nx).iter().enumerate() {
                     let force = number(force);
                     set(solution.lower, row + i, force.max(T::ZERO));

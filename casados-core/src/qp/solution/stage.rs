@@ -1,6 +1,6 @@
 //! Variables and multipliers of one stage.
 
-/// What a solution has of one stage.
+/// The variables and multipliers of one stage of a solution.
 ///
 /// ```
 /// # use casados::qp::*;
@@ -45,7 +45,7 @@ pub struct SolutionStage<'a, T> {
     pub g_upper: &'a [T],
 }
 
-/// As [`SolutionStage`], to be written.
+/// A mutable view of [`SolutionStage`].
 ///
 /// ```
 /// # use casados::qp::*;

@@ -1,7 +1,7 @@
-//! Products of blocks and rows of numbers, in registers where a machine has them.
+//! Products of blocks and rows of numbers, in registers.
 
-/// Products of blocks with their columns in registers. Left to itself the compiler puts rows into
-/// registers, and transposes every block for it.
+/// Products of blocks with their columns in registers. Compilers would put rows into registers, and
+/// transpose every block.
 #[cfg(target_arch = "x86_64")]
 macro_rules! blocks {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
@@ -14,7 +14,7 @@ macro_rules! blocks {
         ) {
             use crate::scalar::lanes::$avx2 as Register;
             if const { S == 2 } {
-                // A whole block fits a register.
+                // The whole block fits a register.
                 let Some(target) = target.as_flattened_mut().first_chunk_mut::<4>() else { return };
                 let Some(&[l00, l10, l01, l11]) = left.as_flattened().first_chunk() else { return };
                 let Some(&[r00, r10, r01, r11]) = right.as_flattened().first_chunk() else { return };
@@ -28,8 +28,8 @@ macro_rules! blocks {
             }
             if const { WIDE && S == 4 } {
                 use crate::scalar::lanes::$avx512 as Wide;
-                // Some columns are a register: in all places of each the numbers of its row on the
-                // right, one after the other.
+                // Several columns fit a register; the factors of each are the numbers of its row on
+                // the right, one after the other.
                 let mut columns = [Wide::<$most>::splat(0.0); S];
                 for (column, left) in columns.iter_mut().zip(left) {
                     if let Some(left) = left.first_chunk() {
@@ -85,7 +85,7 @@ macro_rules! blocks {
                 return;
             }
             if const { S > 1 && S <= $more } {
-                // Two slices side by side are a loop that the optimiser may take for a long one.
+                // Two slices in one loop, which the optimiser may take for a long one.
                 let (mut sum, mut k) = (Register::<S>::load(target), 0);
                 while k < S {
                     sum = sum.subtract_product(Register::<S>::load(&block[k]), Register::<S>::splat(x[k]));
@@ -158,7 +158,7 @@ macro_rules! blocks {
             _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
-            // One register, written without a loop: most rows are that, and compile in less time.
+            // One register, without a loop: the most frequent case, which compiles faster.
             if const { WIDE && W == $most } {
                 let (t, r) = (Wide::<W>::load(target), Wide::<W>::load(row));
                 return t.subtract_product(Wide::<W>::splat(factor), r).store(target);
@@ -197,7 +197,7 @@ macro_rules! blocks {
             _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
-            // The complex ones, and the real one behind them.
+            // The complex numbers, followed by the real one.
             if const { WIDE && N / 2 * 2 == $most } {
                 Wide::<$most>::subtract_complex(target, a, b);
             } else if const { N / 2 * 2 == $more } {

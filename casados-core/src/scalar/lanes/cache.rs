@@ -1,19 +1,18 @@
-//! The size of the second-level cache: how much may lie in it decides how many intervals are
-//! computed side by side.
+//! The size of the second-level cache, which limits the number of intervals computed together.
 
 #[cfg(target_arch = "x86_64")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// What machines have that do not tell: half a megabyte or more.
+/// Assumed size for machines that do not report it, in bytes.
 const DEFAULT_CACHE_SIZE: usize = 1 << 19;
 
-/// What the processor said: asking takes long, above all in a virtual machine. Zero until somebody
-/// does.
+/// The size reported by the processor, cached because the query is slow, above all in a virtual
+/// machine. Zero until the first query.
 #[cfg(target_arch = "x86_64")]
 static CACHE_SIZE: AtomicUsize = AtomicUsize::new(0);
 
-/// For tests: from now on the second-level cache has so many bytes, if machines of this kind are
-/// asked for it; zero stands for what the machine says.
+/// For tests: overrides the size of the second-level cache in bytes, on architectures that report
+/// it; zero restores the reported size.
 #[doc(hidden)]
 #[cfg(feature = "testing")]
 pub fn limit_cache(bytes: usize) {
@@ -23,7 +22,7 @@ pub fn limit_cache(bytes: usize) {
     let _ = bytes;
 }
 
-/// Bytes of the second-level cache.
+/// The size of the second-level cache in bytes.
 #[cfg(target_arch = "x86_64")]
 pub fn second_level_cache() -> usize {
     match CACHE_SIZE.load(Ordering::Relaxed) {
@@ -40,22 +39,22 @@ pub fn second_level_cache() -> usize {
     }
 }
 
-/// Bytes of the second-level cache.
+/// The size of the second-level cache in bytes.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn second_level_cache() -> usize {
     DEFAULT_CACHE_SIZE
 }
 
-/// What the processor says, in kilobytes in the upper half of a register: AMD64 Architecture
-/// Programmer's Manual 3, Intel 64 Software Developer's Manual 2A, both under CPUID, function
-/// 8000_0006h.
+/// The size reported by the processor, in kilobytes in the upper half of a register: AMD64
+/// Architecture Programmer's Manual 3, Intel 64 Software Developer's Manual 2A, both under CPUID,
+/// function 8000_0006h.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, unused_unsafe)]
 fn cache_size_from_cpuid() -> Option<usize> {
     use core::arch::x86_64::__cpuid;
     const FUNCTION: u32 = 0x8000_0006;
-    // SAFETY: every processor of this architecture has the instruction, and functions that it does
-    // not know are not asked for.
+    // SAFETY: every processor of this architecture has the instruction, and unsupported functions
+    // are not queried.
     let kilobytes = unsafe {
         if __cpuid(0x8000_0000).eax < FUNCTION {
             return None;

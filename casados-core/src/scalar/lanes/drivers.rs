@@ -1,13 +1,13 @@
-//! How computations get into registers, on machines that have some.
+//! Dispatch of computations to registers, on machines with SIMD.
 
 pub use super::register::*;
 use crate::scalar::{Packed, Piece, Registers};
 use core::marker::PhantomData;
 
-/// Whether there are any registers of several numbers.
+/// Whether there are registers of several numbers.
 pub const REGISTERS: bool = true;
 
-/// The numbers of each lane beside each other, where no instructions do it.
+/// Transposes registers through memory, without special instructions.
 #[inline(always)]
 pub(super) fn transpose_in_memory<T: Copy + Default, R: Copy, const W: usize>(
     mut rows: [R; W],
@@ -28,7 +28,7 @@ pub(super) fn transpose_in_memory<T: Copy + Default, R: Copy, const W: usize>(
     rows
 }
 
-/// The sum of the lanes of each register, by transposition.
+/// Computes the sum of the lanes of each register by transposition.
 macro_rules! totals_of_columns {
     () => {
         #[inline(always)]
@@ -43,7 +43,7 @@ macro_rules! totals_of_columns {
 }
 pub(super) use totals_of_columns;
 
-/// Runs a computation on `S` numbers side by side in the narrowest register that holds them.
+/// Runs a computation on `S` numbers in the narrowest register that holds them.
 macro_rules! side_by_side {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline(always)]
@@ -51,8 +51,8 @@ macro_rules! side_by_side {
             computation: C,
         ) -> Result<(), C> {
             use crate::scalar::lanes;
-            // Two numbers have a register of four where there is one: with fused products,
-            // elementary functions in it take half the time of those in a register of two.
+            // Two numbers use a register of four if available: with fused products its elementary
+            // functions take half the time of those in a register of two.
             #[cfg(target_arch = "x86_64")]
             if const { S > 1 && S <= $more && lanes::AVX2 } && lanes::level() >= lanes::Level::Avx2 {
                 computation.call::<lanes::$avx2<S>>();
@@ -113,7 +113,7 @@ macro_rules! widest_register {
 pub(crate) use widest_register;
 
 /// Runs a computation on slices in a function that is compiled for the registers. These functions
-/// are long: each number type has them for the registers that pay.
+/// are long: each number type has them only for registers that pay off.
 macro_rules! packed_registers {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline]
@@ -143,11 +143,11 @@ macro_rules! packed_registers {
 }
 pub(crate) use packed_registers;
 
-/// A computation as the piece of code that a register enters.
+/// A computation as the function that a register enters.
 pub struct Inside<E, C, T>(C, PhantomData<(E, T)>);
 
 impl<E, C, T> Inside<E, C, T> {
-    /// With registers of type `E`.
+    /// Uses registers of type `E`.
     pub fn new(computation: C) -> Self {
         Self(computation, PhantomData)
     }

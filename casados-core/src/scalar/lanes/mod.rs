@@ -1,8 +1,7 @@
-//! Registers of several numbers as scalars.
+//! SIMD registers as scalars.
 //!
 //! `F64x4<3>` is a register of four `f64` of which three are used: in memory it is `[f64; 3]`.
-//! Lanes that are not used hold copies of one that is, so that they cost nothing: no special case
-//! is ever taken for their sake alone.
+//! Unused lanes repeat a used one, so that they never cause a special case.
 //!
 //! | machine | registers |
 //! | --- | --- |
@@ -10,16 +9,16 @@
 //! | with AVX2 and FMA | [`F64x4`], [`F32x8`] |
 //! | with AVX-512 F, DQ and VL | [`F64x8`], [`F32x16`] |
 //! | 64-bit Arm | [`F64x2`], [`F32x4`] (NEON) |
-//! | WebAssembly | [`F64x2`], [`F32x4`] (where `simd128` is compiled in) |
+//! | WebAssembly | [`F64x2`], [`F32x4`] (with `simd128`) |
 //!
-//! **Who may use them.** Types of the second and third row may be computed with only where
-//! [`level`] says that the machine has them: the types are not reachable from outside of the crate,
-//! and its drivers ask first. All operations are inlined; they become single instructions inside
-//! [`Scalar::vectorize`](super::Scalar::vectorize), and are slow (but right) outside of it.
+//! **Detection.** Types of the second and third row may be used only if [`level`] reports them: the
+//! types are private to the crate, and its drivers check first. All operations are inlined; they
+//! become single instructions inside [`Scalar::vectorize`](super::Scalar::vectorize), and are slow
+//! (but correct) elsewhere.
 //!
-//! **Bits.** `+ − × ÷ √`, comparisons and `powi` give in each lane the bits that `f64` (`f32`)
-//! gives. Elementary functions are those of [`functions`], with the bounds that are listed there.
-// Where there are no registers, nobody asks for any.
+//! **Bits.** `+ − × ÷ √`, comparisons and `powi` of each lane are bitwise equal to those of `f64`
+//! (`f32`). Elementary functions are those of [`functions`], with the bounds listed there.
+// Unused on machines without registers.
 #![cfg_attr(
     not(any(
         target_arch = "x86_64",
@@ -81,18 +80,18 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub(crate) use blocks::blocks;
 pub use drivers::*;
 
-/// The registers that may be used.
+/// The available registers.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
-    /// None: numbers one at a time. Computations on slices take `Base` where there is such.
+    /// None: single numbers. Computations on slices use `Base` if it exists.
     Single,
-    /// Those that every machine of this kind has: `F64x2`, `F32x4`.
+    /// The registers of the baseline instruction set: `F64x2`, `F32x4`.
     Base,
-    /// `F64x4`, `F32x8` as well.
+    /// Also `F64x4`, `F32x8`.
     Avx2,
-    /// `F64x8`, `F32x16` as well.
+    /// Also `F64x8`, `F32x16`.
     Avx512,
 }
 
@@ -101,7 +100,7 @@ pub use cache::limit_cache;
 #[cfg(feature = "alloc")]
 pub(crate) use cache::second_level_cache;
 
-/// What machines are asked for each level.
+/// The machine features that each level requires.
 macro_rules! registers {
     ($level:expr, $has:ident) => {
         match $level {
@@ -113,19 +112,18 @@ macro_rules! registers {
     };
 }
 
-/// The level that is used; [`UNKNOWN`] until somebody asks.
+/// The level in use; [`UNKNOWN_LEVEL`] before the first query.
 static SIMD_LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN_LEVEL);
 const UNKNOWN_LEVEL: u8 = u8::MAX;
 
-/// For tests: from now on no calculation of the process uses wider registers than these, nor such
-/// as the machine does not have.
+/// For tests: limits the registers of the process to this level, and to those of the machine.
 #[doc(hidden)]
 pub fn limit_level(limit: Level) {
     SIMD_LEVEL.store(widest_level(limit) as u8, Ordering::Relaxed);
 }
 
-/// The registers that the build names (`-C target-cpu=native`): every machine has them that may run
-/// the program, and there is code for no others.
+/// The registers enabled at compile time (`-C target-cpu=native`): every machine that runs the
+/// program has them, and code for others is omitted.
 const BUILD_LEVEL: Option<Level> = if is_enabled_by_build(Level::Avx512) {
     Some(Level::Avx512)
 } else if is_enabled_by_build(Level::Avx2) {
@@ -134,8 +132,8 @@ const BUILD_LEVEL: Option<Level> = if is_enabled_by_build(Level::Avx512) {
     None
 };
 
-/// Whether this may be the [`level`] of a machine that runs the program. Without `std` nobody asks
-/// the machine, and it has what the program was compiled for.
+/// Whether this may be the [`level`] of a machine that runs the program. Without `std` there is no
+/// detection, and the level is that of the build.
 pub const fn may_be_available(level: Level) -> bool {
     match BUILD_LEVEL {
         Some(named) => level as u8 == named as u8,
@@ -146,8 +144,8 @@ pub const fn may_be_available(level: Level) -> bool {
 /// Whether a machine that runs the program may have AVX2.
 pub const AVX2: bool = may_be_available(Level::Avx2) || may_be_available(Level::Avx512);
 
-/// The widest registers that this machine has and [`limit`] allows; those that the build names,
-/// where it does.
+/// The widest registers of this machine within [`limit_level`]; those of the build, if it sets a
+/// level.
 #[inline(always)]
 pub fn level() -> Level {
     if let Some(named) = BUILD_LEVEL {
@@ -160,7 +158,7 @@ pub fn level() -> Level {
         level if level == Level::Avx512 as u8 => Level::Avx512,
         _ => detect_level(),
     };
-    // What there cannot be the compiler leaves out.
+    // The compiler omits impossible levels.
     match level {
         Level::Avx512 | Level::Avx2 if !AVX2 => Level::Base,
         level => level,
@@ -173,13 +171,13 @@ fn detect_level() -> Level {
     widest_level(Level::Avx512)
 }
 
-/// The widest registers that this machine has, up to a limit.
+/// The widest registers of this machine, up to a limit.
 fn widest_level(limit: Level) -> Level {
     let levels = [Level::Avx512, Level::Avx2, Level::Base];
     levels.into_iter().find(|&level| level <= limit && is_detected(level)).unwrap_or(Level::Single)
 }
 
-/// Whether the build says that every machine has these registers.
+/// Whether the build enables these registers.
 const fn is_enabled_by_build(level: Level) -> bool {
     macro_rules! has {
         ($($feature:tt)*) => { $(cfg!(target_feature = $feature))&&* };

@@ -5,10 +5,10 @@ use super::functions::Call;
 use super::shared::{define, through_memory};
 use core::arch::aarch64::*;
 
-// SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the
-// machine has the instructions, and NEON is compiled in (`is_detected` says so where it is not: such a
-// target has no `std`). Loads and stores, which take pointers, are made on arrays that are as large
-// as the register, and ask for no alignment.
+// SAFETY of every `unsafe` of this file: these intrinsics require only that the machine has the
+// instructions, and NEON is enabled at compile time (otherwise, on targets without `std`,
+// `is_detected` returns false). Loads and stores, which take pointers, get arrays as large as the
+// register, and require no alignment.
 
 /// Two `f64`.
 pub mod neon_f64 {

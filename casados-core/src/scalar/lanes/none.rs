@@ -1,6 +1,6 @@
-//! Machines without registers of several numbers: numbers one at a time.
+//! Machines without SIMD registers: single numbers.
 
-/// Whether there are any registers of several numbers.
+/// Whether there are registers of several numbers.
 pub const REGISTERS: bool = false;
 
 macro_rules! no_registers {

@@ -1,4 +1,4 @@
-//! The types: one number type over each kind of register.
+//! The register types: one number type for each kind of register.
 
 use super::functions::{self, DoubleRegister, Single};
 #[cfg(target_arch = "aarch64")]
@@ -19,21 +19,21 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 #[macro_use]
 mod parts;
 
-/// Both in one register, inside of a function for AVX-512.
+/// Joins two halves, within a function for AVX-512.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub(super) fn join_halves(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
     F64x8(avx512_f64::join(a.0, b.0))
 }
 
-/// Both halves.
+/// Splits a register into its halves.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub(super) fn split_halves(joined: F64x8<8>) -> [F64x4<4>; 2] {
     avx512_f64::halves(joined.0).map(F64x4)
 }
 
-/// A type of numbers: its documentation, its name, the type of one lane, the module of its
+/// Defines a number type: its documentation, its name, the type of one lane, the module of its
 /// instructions, the macro of its elementary functions, and that of its demoted numbers.
 macro_rules! register {
     ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $demote:ident) => {
@@ -42,22 +42,21 @@ macro_rules! register {
         #[repr(transparent)]
         pub struct $name<const N: usize>($ops::Register);
 
-        // SAFETY: a register is numbers and nothing else, all of them zero if its bits are.
+        // SAFETY: a register consists of numbers, and zero bits are zeros.
         #[allow(unsafe_code)]
         unsafe impl<const N: usize> Zeroable for $name<N> {}
 
         impl<const N: usize> $name<N> {
-            /// The lanes that are used, one bit each.
-            // Types with more numbers than the register holds are named in code that is never
-            // reached.
+            /// The used lanes, one bit each.
+            // Types with more numbers than the register holds are named in unreachable code.
             const USED: u32 = if N >= 1 && N <= $ops::WIDTH { ((1u64 << N) - 1) as u32 } else { 0 };
 
-            /// A number in every lane.
+            /// A register with the number in every lane.
             #[inline(always)]
             pub fn splat(value: $element) -> Self {
                 Self($ops::splat(value))
             }
-            /// The numbers of the lanes that are used.
+            /// The numbers of the used lanes.
             #[inline(always)]
             pub fn to_array(self) -> [$element; N] {
                 let mut array = [0.0; N];
@@ -128,7 +127,7 @@ macro_rules! register {
             fn vectorize<P: Piece>(piece: P) {
                 $ops::enter::<functions::Run, _>(piece);
             }
-            // All bits are zero, which the compiler sees where it may not use the register.
+            // Zero bits, which the compiler recognises even without the register's instructions.
             #[inline(always)]
             fn zeros<const LENGTH: usize>() -> [Self; LENGTH] {
                 [Zeroable::zeroed(); LENGTH]
@@ -147,7 +146,7 @@ macro_rules! register {
                 let sign = $ops::and(self.0, $ops::splat(-0.0));
                 Self($ops::select($ops::eq(self.0, self.0), $ops::or(sign, $ops::splat(1.0)), self.0))
             }
-            // As `f64` does it.
+            // Bitwise equal to `powi` of `f64`.
             #[inline(always)]
             fn powi(self, n: i32) -> Self {
                 power(self, n)
@@ -277,11 +276,11 @@ macro_rules! register {
 }
 
 register! {
-    /// Up to two `f64`, in a register that every machine of the kind has.
+    /// Up to two `f64`, in a register of the baseline instruction set.
     F64x2, f64, base_f64, of_doubles, as_it_is
 }
 register! {
-    /// Up to four `f32`, in a register that every machine of the kind has.
+    /// Up to four `f32`, in a register of the baseline instruction set.
     F32x4, f32, base_f32, of_singles, as_it_is
 }
 double!(F64x2, base_f64);

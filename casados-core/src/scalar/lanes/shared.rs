@@ -1,13 +1,13 @@
-//! What modules of registers are made of on more than one kind of machine.
+//! Macros shared by the register modules of several architectures.
 
-/// Functions of an expression of intrinsics each, of which the machine has the instructions: see
-/// the heads of the files that have them.
+/// Functions of an expression of intrinsics each, which the machine supports: see the heads of
+/// their files.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! define {
     ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
         $(#[$attribute])*
         #[inline(always)]
-        #[allow(unused_unsafe)] // The compiler knows which instructions are always there.
+        #[allow(unused_unsafe)] // Some instructions are always enabled, so the block may be unnecessary.
         pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $body }
@@ -17,14 +17,14 @@ macro_rules! define {
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub(super) use define;
 
-/// Loads and stores of the first `N` numbers of a register, by those of a whole one at a place in
-/// the memory that asks for no alignment; transposition, and a function that is not inlined.
+/// Loads and stores of the first `N` numbers of a register, by whole unaligned accesses;
+/// transposition, and a function that is not inlined.
 #[cfg(any(target_arch = "aarch64", target_arch = "wasm32"))]
 macro_rules! through_memory {
     ($element:ty, $width:literal, |$from:ident| $load:expr, |$to:ident, $a:ident| $store:expr) => {
         pub const WIDTH: usize = $width;
 
-        /// Lanes that are not used are copies of the last one that is.
+        /// Unused lanes repeat the last used one.
         #[inline(always)]
         pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
             let all: [$element; $width] =
@@ -41,7 +41,7 @@ macro_rules! through_memory {
             unsafe { $store };
             cell.copy_from_slice(&all[..N]);
         }
-        /// The numbers of each lane beside each other.
+        /// Transposes the registers.
         #[inline(always)]
         pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
             super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)

@@ -1,5 +1,5 @@
-//! Elementary functions of several arguments at once: in registers that have room for two, and
-//! abreast, so that the processor works on some while others wait for themselves.
+//! Elementary functions of several arguments in one call: in wider registers, and interleaved, so
+//! that the processor works on one while another waits for its own results.
 
 use super::functions::{CallWithEight, CallWithFour, Double, Elementary, Two};
 use super::register::{F64x4, join_halves, split_halves};
@@ -12,7 +12,7 @@ macro_rules! ends {
     };
 }
 
-/// Results of registers that are all used, in such as these.
+/// The results as registers with all lanes used.
 macro_rules! results {
     ($results:expr) => {{
         let (found, mut results) = ($results, [[Self::splat(0.0); R]; COUNT]);
@@ -25,9 +25,9 @@ macro_rules! results {
     }};
 }
 
-/// The elementary functions of doubles, and two or four of them abreast: the processor works on
-/// each while others wait for themselves. Before that what is listed is looked at: a condition, and
-/// the results where it holds.
+/// The elementary functions of doubles, two or four of them interleaved: the processor works on one
+/// while another waits for its own results. Special cases, a condition with its results, are tested
+/// first.
 macro_rules! abreast {
     ($name:ident, $ops:ident [$($functions:tt)*] |$a:ident| $($condition:expr => $first:expr),*) => {
         of_doubles!($name, $ops: $($functions)*);
@@ -58,15 +58,15 @@ macro_rules! abreast {
     };
 }
 
-/// In registers of eight.
+/// For registers of eight.
 macro_rules! of_eights {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
         abreast!($name, $ops [$($functions)*] |a|);
     };
 }
 
-/// In registers of four: two in one register where each takes half of one, or where there are
-/// registers twice as wide.
+/// For registers of four: two in one register if each uses half of it, or if there are registers
+/// twice as wide.
 macro_rules! of_fours {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
         abreast!($name, $ops [$($functions)*] |a|
@@ -94,7 +94,7 @@ macro_rules! of_fours {
 }
 pub(super) use {abreast, ends, of_eights, of_fours, results};
 
-/// Functions abreast, each given by its first and its last argument.
+/// Interleaved functions, each given by its first and its last argument.
 pub struct Abreast<F, const K: usize, const R: usize>(PhantomData<F>);
 
 /// The arguments of a function.
@@ -134,8 +134,7 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithEig
     }
 }
 
-/// Functions in registers that are twice as wide, two in each, given by their first and their last
-/// arguments.
+/// Functions in registers twice as wide, two in each, given by their first and last arguments.
 pub struct Wider<F, const K: usize, const R: usize>(PhantomData<F>);
 
 impl<F: Elementary<K, R>, const K: usize, const R: usize> CallWithFour<F64x4<4>> for Wider<F, K, R> {

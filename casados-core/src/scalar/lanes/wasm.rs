@@ -5,8 +5,8 @@ use super::functions::Call;
 use super::shared::through_memory;
 use core::arch::wasm32::*;
 
-/// Functions of an expression of intrinsics each, which are safe: a module with instructions that a
-/// machine does not have is refused as a whole.
+/// Functions of an expression of intrinsics each. They are safe: a machine without the instructions
+/// rejects the whole module.
 macro_rules! define {
     ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
         $(#[$attribute])*
@@ -17,7 +17,7 @@ macro_rules! define {
     )* };
 }
 
-/// What is the same for numbers of either kind.
+/// Functions that are the same for both number types.
 macro_rules! numbers {
     ($element:ty, $width:literal) => {
         pub type Register = v128;

@@ -7,17 +7,16 @@ use super::functions::{Call, CallWithEight, CallWithFour};
 use super::shared::define;
 use core::arch::x86_64::*;
 
-// SAFETY of every `unsafe` of this file and its modules: the one condition of calling these
-// intrinsics is that the machine has the instructions. SSE2 is part of x86-64. A register of AVX2
-// or AVX-512 is computed with only after detection, as the head of `lanes` says. Loads and stores,
-// which take pointers, are made on references to arrays that are as large as what is read or
-// written, and ask for no alignment.
+// SAFETY of every `unsafe` of this file and its modules: these intrinsics require only that the
+// machine has the instructions. SSE2 is part of x86-64. Registers of AVX2 or AVX-512 are used only
+// after detection, as the head of `lanes` states. Loads and stores, which take pointers, get
+// references to arrays as large as the access, and require no alignment.
 
 /// Functions of one intrinsic each.
 macro_rules! wrap {
     ($($name:ident($($argument:ident: $type:ty),*) -> $result:ty = $intrinsic:ident $(::<$constant:tt>)?;)*) => { $(
         #[inline(always)]
-        #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
+        #[allow(unused_unsafe)] // SSE2 is always enabled, so the block may be unnecessary.
         pub fn $name($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $intrinsic $(::<$constant>)? ($($argument),*) }
@@ -30,11 +29,11 @@ macro_rules! memory {
     ($element:ty, $width:literal, $load:ident, $store:ident, $set:ident; $($index:literal)*) => {
         pub const WIDTH: usize = $width;
 
-        /// Lanes that are not used are copies of the last one that is.
+        /// Unused lanes repeat the last used one.
         #[inline(always)]
         #[allow(unused_unsafe)]
         pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
-            // SAFETY: the array is as large as the register that is loaded whole.
+            // SAFETY: the array is as large as the whole register.
             unsafe {
                 if const { N == $width } {
                     $load(cell.as_ptr())
@@ -57,7 +56,7 @@ macro_rules! memory {
     };
 }
 
-/// The numbers of each lane beside each other.
+/// Transposes registers through memory.
 macro_rules! transpose_in_memory {
     ($element:ty) => {
         #[inline(always)]
@@ -70,7 +69,7 @@ macro_rules! transpose_in_memory {
 /// A function that is compiled for given instructions.
 macro_rules! enter {
     ($features:literal) => {
-        /// Calls `F` where the instructions of this register may be used; not inlined.
+        /// Calls `F` with the instructions of this register enabled; not inlined.
         #[inline(always)]
         pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {
             #[target_feature(enable = $features)]
@@ -84,16 +83,16 @@ macro_rules! enter {
     };
 }
 
-/// Functions that are compiled for given instructions, of four and of eight arguments. Each has a
-/// place of its own: from an array registers would be loaded with parts of two of them, for which
-/// the processor waits until both are in the cache.
+/// Functions that are compiled for given instructions, with four and eight arguments. Each argument
+/// is passed separately: registers loaded across two elements of an array would wait until both are
+/// in the cache.
 macro_rules! enter_with_many {
     ($features:literal) => {
         enter_with_many!($features, enter_with_four, CallWithFour, 4: a b c d);
         enter_with_many!($features, enter_with_eight, CallWithEight, 8: a b c d e f g h);
     };
     ($features:literal, $enter:ident, $call:ident, $count:literal: $($argument:ident)*) => {
-        /// Calls `F` where the instructions of this register may be used; not inlined.
+        /// Calls `F` with the instructions of this register enabled; not inlined.
         #[inline(always)]
         pub fn $enter<F: $call<A>, A>([$($argument),*]: [A; $count]) -> F::Output {
             #[target_feature(enable = $features)]
@@ -108,7 +107,7 @@ macro_rules! enter_with_many {
     };
 }
 
-/// The sum of all lanes, and the largest, from those of half as many.
+/// The sum and the maximum of all lanes, from registers with half as many.
 macro_rules! halves {
     ($element:ty, $half:ident, $low:ident, $high:ident) => {
         #[inline(always)]
@@ -349,25 +348,25 @@ pub mod avx2_f32 {
     }
 }
 
-/// Loads and stores under a mask, masks of one bit for each lane.
+/// Masked loads and stores; masks have one bit for each lane.
 macro_rules! masked {
     ($element:ty, $width:literal, $mask:ident, $load:ident, $store:ident, $blend:ident) => {
         pub const WIDTH: usize = $width;
 
-        /// The first `N` lanes; all of them where there are no more, none of them if `N` is zero.
+        /// The mask of the first `N` lanes, at most all of them.
         const fn first<const N: usize>() -> $mask {
             if N < $width { !($mask::MAX << N) } else { $mask::MAX }
         }
 
-        /// Lanes that are not used are copies of the first.
+        /// Unused lanes repeat the first one.
         #[inline(always)]
         pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
-            // SAFETY: only the lanes of the array are read, of one of any length.
+            // SAFETY: only the lanes of the array are read, whatever its length.
             unsafe { $load(splat(cell[0]), const { first::<N>() }, cell.as_ptr()) }
         }
         #[inline(always)]
         pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
-            // SAFETY: only the lanes of the array are written, of one of any length.
+            // SAFETY: only the lanes of the array are written, whatever its length.
             unsafe { $store(cell.as_mut_ptr(), const { first::<N>() }, a) }
         }
         define! {

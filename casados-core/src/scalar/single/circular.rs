@@ -2,7 +2,7 @@
 //!
 //! `a = n π/2 + r` with `|r| ≤ π/4`: for `|a| < 3000` by π/2 in pieces of 12 bits (Cody and Waite),
 //! for larger arguments by the digits of 2/π (Payne and Hanek). The remainder is a sum of two
-//! numbers, so that its rounding error does not count. Polynomials are those of FreeBSD's
+//! numbers, so that its rounding error is negligible. Polynomials are those of FreeBSD's
 //! `k_sinf.c`, `k_cosf.c` and `e_asinf.c`.
 
 use super::{ROUNDING_SHIFT, exact_ordered_sum, exact_product, exact_sum, polynomial, sqrt};
@@ -13,7 +13,7 @@ const SIN_POLYNOMIAL: [f32; 4] = [2.718_311_5e-6, -1.983_933_5e-4, 8.333_33e-3, 
 /// `(cos r − 1 + r²/2)/r⁴` in `r²`
 const COS_POLYNOMIAL: [f32; 3] = [2.439_044_9e-5, -1.388_676_4e-3, 0.041_666_623];
 
-/// π/2 in three pieces of 12 bits, and what is left. (As bits, for they must be exact.)
+/// π/2 in three pieces of 12 bits, and the remainder; as bits, since they must be exact.
 const PI_2_PARTS: [f32; 4] = [
     f32::from_bits(0x3FC9_0000),
     f32::from_bits(0x39FD_A000),
@@ -24,7 +24,7 @@ const PI_2_PARTS: [f32; 4] = [
 /// Integers below 2¹² times a piece of 12 bits are exact.
 const MAX_REDUCED_ARGUMENT: f32 = 3000.0;
 
-/// The digits of 2/π, 32 zeros first.
+/// The digits of 2/π after 32 zeros.
 const TWO_OVER_PI_DIGITS: [u32; 8] =
     [0, 0xA2F9_836E, 0x4E44_1529, 0xFC27_57D1, 0xF534_DDC0, 0xDB62_9599, 0x3C43_9041, 0xFE51_63AB];
 
@@ -42,13 +42,13 @@ fn reduce_modulo_pi_2(a: f32) -> (u32, (f32, f32)) {
     (shifted.to_bits(), exact_ordered_sum(third.0, (third.1 + second.1) - n * PI_2_PARTS[3]))
 }
 
-/// The product of the 24 digits of `a` with those of 2/π that matter: quarter turns in the upper
-/// two bits of 64, and what is left of one below.
+/// The product of the 24 digits of `a` with the relevant digits of 2/π: quarter turns in the upper
+/// two bits of 64, followed by the fraction.
 #[cold]
 fn reduce_large_argument(a: f32) -> (u32, (f32, f32)) {
     let bits = a.to_bits();
     let mantissa = u64::from(bits & 0x007F_FFFF | 0x0080_0000);
-    // Digits of 2/π before these give whole turns only.
+    // Earlier digits of 2/π contribute whole turns only.
     let begin = (bits >> 23).saturating_sub(120);
     let word = |index: u32| u64::from(*TWO_OVER_PI_DIGITS.get(index as usize).unwrap_or(&0));
     let (first, shift) = (begin / 32, begin % 32);
@@ -67,7 +67,7 @@ fn reduce_large_argument(a: f32) -> (u32, (f32, f32)) {
     (n as u32, exact_ordered_sum(r, low))
 }
 
-/// What π/2 lacks as `f32`.
+/// π/2 minus its `f32`.
 const FRAC_PI_2_LOW: f32 = -4.371_139e-8;
 
 /// `(sin r, cos r)` as sums.
@@ -80,7 +80,7 @@ fn sin_cos_reduced((r, low): (f32, f32)) -> ((f32, f32), (f32, f32)) {
     (sin, (one.0, one.1 + (square * square * polynomial(square, COS_POLYNOMIAL) - r * low)))
 }
 
-/// A number with its sign changed where a bit of `n` is set.
+/// Changes the sign of a number if a bit of `n` is set.
 #[inline(always)]
 fn flip_sign_by_bit(a: f32, n: u32) -> f32 {
     f32::from_bits(a.to_bits() ^ (n & 2) << 30)
@@ -118,7 +118,7 @@ pub fn tan(a: f32) -> f32 {
     if !a.is_finite() {
         return f32::NAN;
     }
-    // So small a number is its own tangent, and its products would underflow.
+    // A number this small equals its tangent, and its products would underflow.
     if a.abs() < 1e-4 {
         return a + a * (a * a) * (1.0 / 3.0);
     }
@@ -141,7 +141,7 @@ pub fn asin(a: f32) -> f32 {
     if magnitude < 0.5 {
         return a + a * ratio(a * a);
     }
-    // Of what is larger than one the root is NaN.
+    // For arguments larger than one the root is NaN.
     let z = (1.0 - magnitude) * 0.5;
     let root = sqrt(z);
     let upper = f32::from_bits(root.to_bits() & 0xFFFF_F000);

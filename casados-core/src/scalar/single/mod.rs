@@ -1,11 +1,11 @@
-//! Elementary functions of `f32` without the standard library, where `libm` computes them in `f64`:
-//! on a processor with an FPU for single precision that takes eight times as long; and `exp`, that
-//! of `libm` takes its own time for small arguments. These take no operation of double precision at
-//! all. The other functions of `libm` are single precision themselves.
+//! Elementary functions of `f32` without the standard library, for those that `libm` computes in
+//! `f64`, eight times slower on processors with a single-precision FPU, and for `exp`, whose run
+//! time in `libm` depends on the argument. No operation has double precision. The other functions
+//! of `libm` are in single precision.
 //!
-//! Bounds of the error in units in the last place of the exact result, of these functions and of
-//! those of `libm`; tests compare with `f64` over all arguments that there are, one in ten
-//! thousand, or in thousand of an optimised build.
+//! Bounds of the error in units in the last place of the exact result, for these functions and
+//! those of `libm`; tests compare with `f64` over all arguments, one in ten thousand, or one in a
+//! thousand with optimisation.
 //!
 //! | function | bound |
 //! | --- | --- |
@@ -22,7 +22,7 @@ mod tests;
 
 pub use circular::{asin, cos, sin, sin_cos, tan};
 
-/// `√a`, in the one instruction that processors with an FPU have for it.
+/// `√a`, by the instruction of processors with an FPU.
 #[inline(always)]
 pub fn sqrt(a: f32) -> f32 {
     #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
@@ -31,16 +31,16 @@ pub fn sqrt(a: f32) -> f32 {
     libm::sqrtf(a)
 }
 
-/// `core` does not offer square roots, and the compiler does not recognise `libm`'s. It does not
-/// hand out registers of an FPU for single precision either.
+/// `core` lacks square roots, the compiler does not recognise `libm`'s, and inline assembly has no
+/// register class for a single-precision FPU.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[allow(unsafe_code)]
 mod instruction {
     #[inline(always)]
     pub fn sqrt(a: f32) -> f32 {
         let mut bits = a.to_bits();
-        // SAFETY: it changes the two registers that it is given, and leaves `s0` as it was; every
-        // target with this binary interface has the instruction.
+        // SAFETY: it changes the two given registers, and restores `s0`; every target with this
+        // binary interface has the instruction.
         unsafe {
             core::arch::asm!(
                 "vmov {kept}, s0",
@@ -70,9 +70,9 @@ fn scale_by_power_of_two(a: f32, n: i32) -> f32 {
 pub fn exp2(a: f32) -> f32 {
     const EXP2_POLYNOMIAL: [f32; 5] =
         [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1];
-    // What ln 2 lacks as `f32`.
+    // ln 2 minus its `f32`.
     const LN_2_LOW: f32 = -1.904_654_3e-9;
-    // Comparisons with NaN are false: it stays.
+    // Comparisons with NaN are false: NaN is returned.
     let a = if a > 130.0 { 130.0 } else { a };
     let a = if a < -152.0 { -152.0 } else { a };
     let n = (a + ROUNDING_SHIFT) - ROUNDING_SHIFT;
@@ -90,9 +90,9 @@ pub fn exp2(a: f32) -> f32 {
 pub fn exp(a: f32) -> f32 {
     const EXP_POLYNOMIAL: [f32; 6] =
         [1.987_569_2e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
-    /// ln 2 as 355/512, whose products with `n` are exact, and what that is too large by.
+    /// ln 2 as 355/512, whose products with `n` are exact, and the excess of that.
     const LN_2: [f32; 2] = [f32::from_bits(0x3F31_8000), 2.121_944_4e-4];
-    // Comparisons with NaN are false: it stays.
+    // Comparisons with NaN are false: NaN is returned.
     let a = if a > 90.0 { 90.0 } else { a };
     let a = if a < -105.0 { -105.0 } else { a };
     let n = (a * core::f32::consts::LOG2_E + ROUNDING_SHIFT) - ROUNDING_SHIFT;
@@ -101,8 +101,8 @@ pub fn exp(a: f32) -> f32 {
     scale_by_power_of_two(one + (low + (rest + r * r * polynomial(r, EXP_POLYNOMIAL))), n as i32)
 }
 
-/// `∛a`: a guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of Halley's
-/// method, the last one with the error of the cube.
+/// `∛a`: an initial guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of
+/// Halley's method, the last one with the error of the cube.
 pub fn cbrt(a: f32) -> f32 {
     let magnitude = a.abs();
     if !(magnitude > 0.0 && magnitude <= f32::MAX) {
@@ -122,7 +122,7 @@ pub fn cbrt(a: f32) -> f32 {
     (root * back).copysign(a)
 }
 
-/// `√(a² + b²)`, the larger one scaled to where squares neither overflow nor underflow.
+/// `√(a² + b²)`, scaled by the larger one so that squares neither overflow nor underflow.
 pub fn hypot(a: f32, b: f32) -> f32 {
     let (a, b) = (a.abs(), b.abs());
     if a == f32::INFINITY || b == f32::INFINITY {
@@ -144,7 +144,7 @@ pub fn hypot(a: f32, b: f32) -> f32 {
 const TWO_TO_8: f32 = 256.0;
 const TWO_TO_90: f32 = (1_u128 << 90) as f32;
 
-/// What brings a number between bounds, and its result back: powers of two and their reciprocals.
+/// Powers of two that scale a number into bounds, and its result back.
 #[inline(always)]
 fn power_of_two_scaling(a: f32, [low, high]: [f32; 2], [up, down]: [f32; 2]) -> (f32, f32) {
     if a < low {
@@ -156,31 +156,30 @@ fn power_of_two_scaling(a: f32, [low, high]: [f32; 2], [up, down]: [f32; 2]) -> 
     }
 }
 
-/// `arcosh a`; that of `libm` is a number for some below one.
+/// `arcosh a`; that of `libm` is not NaN for some arguments below one.
 pub fn acosh(a: f32) -> f32 {
     if a < 1.0 { f32::NAN } else { libm::acoshf(a) }
 }
 
-/// `1.5 · 2²³`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
-/// last bits.
+/// `1.5 · 2²³`: adding and subtracting it rounds to an integer; adding it alone leaves the integer
+/// in the last bits.
 const ROUNDING_SHIFT: f32 = 12_582_912.0;
 
-/// `a + b` and what rounding took, for `|a| ≥ |b|`.
+/// `a + b` and its rounding error, for `|a| ≥ |b|`.
 #[inline(always)]
 fn exact_ordered_sum(a: f32, b: f32) -> (f32, f32) {
     let [high, low] = super::fast_two_sum(a, b);
     (high, low)
 }
 
-/// `a + b` and what rounding took.
+/// `a + b` and its rounding error.
 #[inline(always)]
 fn exact_sum(a: f32, b: f32) -> (f32, f32) {
     let [high, low] = super::two_sum(a, b);
     (high, low)
 }
 
-/// `a b` and what rounding took (Dekker), of numbers whose product neither overflows nor
-/// underflows.
+/// `a b` and its rounding error (Dekker), without overflow or underflow.
 #[inline(always)]
 fn exact_product(a: f32, b: f32) -> (f32, f32) {
     let halves = |a: f32| {
@@ -192,7 +191,7 @@ fn exact_product(a: f32, b: f32) -> (f32, f32) {
     (high, a2 * b2 - (((high - a1 * b1) - a2 * b1) - a1 * b2))
 }
 
-/// A polynomial, its highest power first.
+/// A polynomial; the coefficient of the highest power is the first.
 #[inline(always)]
 fn polynomial<const K: usize>(x: f32, coefficients: [f32; K]) -> f32 {
     coefficients.into_iter().fold(0.0, |sum, c| sum * x + c)

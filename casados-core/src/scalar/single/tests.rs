@@ -1,12 +1,12 @@
-//! Errors of the functions of `f32` that firmware computes with, against `f64`.
+//! Errors of the `f32` functions for firmware, against `f64`.
 
 use std::format;
 use std::string::String;
 
-/// Every how many-th number is tried: a prime, so that no pattern of bits is left out.
+/// Stride of the tested arguments: a prime, so that all bit patterns occur.
 const ARGUMENT_STRIDE: usize = if cfg!(debug_assertions) { 9973 } else { 997 };
 
-/// The distance of a result from the exact one in units in the last place of that.
+/// The distance of a result from the exact one in units in the last place.
 fn error_in_ulps(result: f32, exact: f64) -> f64 {
     let rounded = exact as f32;
     if exact.is_nan() || rounded.is_infinite() || result.is_nan() {
@@ -16,7 +16,7 @@ fn error_in_ulps(result: f32, exact: f64) -> f64 {
     (f64::from(result) - exact).abs() / (exponent - 23.0).exp2()
 }
 
-/// The largest error, and where it is.
+/// The largest error, and its argument.
 fn largest(f: impl Fn(f32) -> f32, exact: impl Fn(f64) -> f64) -> (f64, f32) {
     let mut largest = (0.0, 0.0);
     for bits in (0..=u32::MAX).step_by(ARGUMENT_STRIDE) {
@@ -58,7 +58,7 @@ fn errors_of_functions_of_two_numbers() {
     let mut worst = [(0.0, 0.0, 0.0); 3];
     let mut state = 1_u64;
     for _ in 0..4_000_000_000 / ARGUMENT_STRIDE {
-        // Bits at random, then one of both near the other.
+        // Random bits; then one argument close to the other.
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let a = f32::from_bits((state >> 32) as u32);
         let b = if state & 1 << 20 == 0 {

@@ -1,4 +1,4 @@
-//! Numbers of operations, and work that stays proportional to the size of a graph.
+//! Numbers of operations, and work proportional to the size of a graph.
 
 use super::expression::E;
 use super::models::{aircraft, chain};
@@ -12,7 +12,7 @@ fn nodes(entries: &[Entry]) -> Vec<Node> {
     entries.iter().map(|entry| entry.2).collect()
 }
 
-/// Operations of f, f and Jacobian, gradient, Hessian, and the numbers of non-zeros.
+/// The operations of f, of f and Jacobian, gradient, Hessian, and the numbers of non-zeros.
 fn operation_counts((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32; 4], [usize; 2]) {
     let seeds: Vec<(Node, Node)> = (0..).zip(&f).map(|(row, &f)| (f, graph.seed(row))).collect();
     let first = jacobian(&mut graph, &f, variables);
@@ -23,7 +23,7 @@ fn operation_counts((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32
     (counts, [first.len(), second.len()])
 }
 
-/// The reference is CasADi 3.8.2 (SX, common subexpressions removed) on the same model, and its
+/// The reference is CasADi 3.8.2 (SX, common subexpressions removed) for the same model, and its
 /// sparsity.
 #[test]
 fn aircraft_takes_fewer_operations_than_casadi() {
@@ -34,8 +34,8 @@ fn aircraft_takes_fewer_operations_than_casadi() {
     }
 }
 
-/// The order that is chosen is the best one, for a chain of masses (sparse rows) and for one long
-/// product (a tree: one output of many variables, where reverse mode is best and forward mode
+/// The selected order is the best one for a chain of masses (sparse rows) and for one long product
+/// (a tree: one output of many variables, for which reverse mode is best and forward mode
 /// quadratic).
 #[test]
 fn chosen_order_is_the_cheapest() {
@@ -83,7 +83,7 @@ fn large_chain() {
     }
 }
 
-/// A recurrence `s ← s + c v` with a product and a sine every tenth time.
+/// A recurrence `s ← s + c v`, with a product and a sine in every tenth step.
 fn recurrence(length: u32) -> (Graph, Node) {
     let graph = RefCell::new(Graph::default());
     let v = E::variables(&graph, 4);
@@ -96,7 +96,7 @@ fn recurrence(length: u32) -> (Graph, Node) {
     (graph.into_inner(), f)
 }
 
-/// Deeper than any stack.
+/// Graphs deeper than the stack.
 #[test]
 fn deep_graphs() {
     let (mut graph, f) = recurrence(100_000);
@@ -110,7 +110,7 @@ fn deep_graphs() {
     assert_eq!(hessian(&mut graph, &[(f, seed)], 4).len(), 10);
 }
 
-/// A sum of many different variables: eliminated from the variables, it would be quadratic.
+/// A sum of many variables: forward elimination would be quadratic.
 #[test]
 fn wide_graphs() {
     let begin = Instant::now();

@@ -10,14 +10,13 @@ use std::cell::RefCell;
 
 const ORDERS: [Order; 3] = [Order::Reverse, Order::Forward, Order::Markowitz];
 
-/// Random functions that stay of moderate size: every node is within [-8, 8] for variables in [-1,
-/// 1].
+/// Random functions of moderate magnitude: every node is within [-8, 8] for variables in [-1, 1].
 fn random_graph(random: &mut Random, variables: u32, size: usize, outputs: usize) -> (Graph, Vec<Node>) {
     let graph = RefCell::new(Graph::default());
     let mut nodes = E::variables(&graph, variables);
     let bounded = [Unary::Sin, Unary::Cos, Unary::Tanh, Unary::Atan];
     while nodes.len() < size + variables as usize {
-        // Mostly of what was made last, so that the graph becomes deep.
+        // Recent nodes are preferred, so that the graph becomes deep.
         let pick = |random: &mut Random| {
             let range = if random.below(3) == 0 { nodes.len() } else { nodes.len().min(12) };
             nodes[nodes.len() - 1 - random.below(range)]
@@ -71,9 +70,9 @@ fn assert_close(a: &[Vec<f64>], b: &[Vec<f64>], tolerance: f64, what: &str) {
     }
 }
 
-/// Everything there is about one function at one point, all ways. Rounding: the entries are sums
-/// over paths of products of partial derivatives; a few hundred operations without growth give some
-/// hundred ulps of the largest entry.
+/// Compares all derivatives of a function at one point, by all methods. Entries are sums over paths
+/// of products of partial derivatives; a few hundred operations without growth have rounding errors
+/// of some hundred ulps of the largest entry.
 fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: EvaluationPoint) {
     const ROUNDING_TOLERANCE: f64 = 2048.0 * f64::EPSILON;
     let n = variables as usize;
@@ -134,7 +133,7 @@ fn random_graphs_agree() {
         let point: Vec<f64> = (0..variables).map(|_| random.between(-1.0, 1.0)).collect();
         let seeds: Vec<f64> = f.iter().map(|_| random.between(-1.0, 1.0)).collect();
         let point = EvaluationPoint { variables: &point, seeds: &seeds, ..EvaluationPoint::default() };
-        // The last variable plays the part of time: nothing is differentiated with respect to it.
+        // The last variable represents time: no derivatives with respect to it.
         check_against_each_other(&graph, &f, variables - 1, point);
         check_against_each_other(&graph, &f, variables, point);
     }
@@ -164,8 +163,8 @@ fn models_agree() {
 }
 
 /// Differences of the value and of the gradient, independent of every rule. The step is 1/64, the
-/// order 8; the functions are analytic in a strip of width of order one, and their depth makes it
-/// narrower.
+/// order 8; the functions are analytic in a strip whose width is of order one, reduced by their
+/// depth.
 #[test]
 fn random_graphs_against_differences() {
     let mut random = Random(11);
@@ -255,7 +254,7 @@ fn linear_entries_are_constant() {
     }
 }
 
-/// Behind many nested selections, too, branches that are not taken stay out of derivatives.
+/// Derivatives exclude branches that are not taken, even within many nested selections.
 #[test]
 fn deep_selections() {
     let mut graph = Graph::default();

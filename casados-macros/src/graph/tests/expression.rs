@@ -1,4 +1,4 @@
-//! Expressions with operators, to write models in tests.
+//! Expressions with operators, for models in tests.
 
 use crate::graph::{Binary, Compare, Graph, Node, Unary};
 use std::cell::RefCell;

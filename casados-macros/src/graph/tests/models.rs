@@ -1,4 +1,4 @@
-//! Models as they occur, to count operations on.
+//! Typical models, for counts of operations.
 
 use super::expression::E;
 use crate::graph::{Graph, Node};

@@ -1,5 +1,5 @@
 //! Derivatives of random expressions against `num-dual` and the complex step, within bounds of the
-//! rounding errors of both sides; an expression that fails is shrunk to the smallest that does.
+//! rounding errors of both sides; a failing expression is shrunk to the smallest one.
 
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary, gradient, hessian, jacobian};
 use casados_core::Scalar;
@@ -9,12 +9,12 @@ use num_dual::{Dual64, HyperDual64};
 use proptest::prelude::*;
 
 const VARIABLES: usize = 3;
-/// The complex step, a power of two so that it rounds nothing: `2⁻⁶⁶⁴`.
+/// The complex step `2⁻⁶⁶⁴`, a power of two, so that multiplications by it are exact.
 const COMPLEX_STEP: f64 = f64::from_bits((1023 - 664) << 52);
-/// Operations of a reference for one of `Forward`, at most.
+/// Maximum ratio of the operations of a reference and of `Forward`.
 const REFERENCE_ERROR_FACTOR: f64 = 4.0;
 
-/// An expression, with arguments brought into the domain of each function when the graph is built.
+/// An expression; arguments are mapped into the domain of each function when the graph is built.
 #[derive(Clone, Debug)]
 enum Tree {
     Variable(u32),
@@ -118,12 +118,12 @@ fn into_domain(graph: &mut Graph, function: Unary, a: Node) -> Node {
     }
 }
 
-/// Values of nodes in any arithmetic.
+/// The values of nodes in any arithmetic.
 fn evaluate<S: Scalar>(graph: &Graph, nodes: &[Node], variables: &[S], seed: S) -> Vec<S> {
     evaluate_with(unary, graph, nodes, variables, seed)
 }
 
-/// The same with other functions of one argument.
+/// As [`evaluate`], with other functions of one argument.
 fn evaluate_with<S: Scalar>(
     unary: fn(Unary, S) -> S,
     graph: &Graph,
@@ -186,7 +186,7 @@ fn unary<S: Scalar>(function: Unary, a: S) -> S {
     }
 }
 
-/// `num-dual` differentiates quotients in place of these functions, which rounds more.
+/// `num-dual` differentiates these functions as quotients, with larger rounding errors.
 fn unary_of_reference<S: Scalar>(function: Unary, a: S) -> S {
     match function {
         Unary::Tan => a.sin() / a.cos(),
@@ -208,7 +208,7 @@ fn binary<S: Scalar>(function: Binary, a: S, b: S) -> S {
     }
 }
 
-/// Equal within both errors; says nothing where there is no bound.
+/// Tests equality within both errors; passes if there is no bound.
 fn close(what: &str, found: Bounded, expected: f64, error: f64) -> Result<(), TestCaseError> {
     let tolerance = found.error + REFERENCE_ERROR_FACTOR * error;
     let difference = (found.value - expected).abs();
@@ -234,7 +234,7 @@ proptest! {
         let exact = Bounded::exact;
         let is = |a: usize, b: usize| f64::from(u8::from(a == b));
 
-        // What the graph says, with bounds.
+        // The derivatives of the graph, with bounds.
         let seed = graph.seed(0);
         let rows = jacobian(&mut graph, &[f], VARIABLES as u32);
         let adjoint = gradient(&mut graph, &[(f, seed)], VARIABLES as u32);

@@ -43,7 +43,8 @@ fn unary(function: Unary) -> BinaryCase {
     BinaryCase::new(|a, _| a.unary(function).1)
 }
 
-/// Central difference of order 8, and a bound of its rounding error for values of the given size.
+/// A central difference of order 8, and a bound of its rounding error for values of the given
+/// magnitude.
 fn difference(f: impl Fn(f64) -> f64, at: f64, h: f64) -> (f64, f64) {
     let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
     let mut sum = 0.0;
@@ -57,9 +58,10 @@ fn difference(f: impl Fn(f64) -> f64, at: f64, h: f64) -> (f64, f64) {
     (sum / h, 8.0 * f64::EPSILON * size / h)
 }
 
-/// All derivatives at a point against differences of the value and of the first derivatives. `h` is
-/// small beside the distance to the next singularity: with ratio 1/100 the truncation error of
-/// order 8 is below 1e-15 of the derivative times a factorial over 630, together below 1e-12.
+/// Compares all derivatives at a point with differences of the value and of the first derivatives.
+/// `h` is small relative to the distance to the next singularity: with the ratio 1/100 the
+/// truncation error of order 8 is below 1e-15 of the derivative times a factorial over 630, in
+/// total below 1e-12.
 fn check_differences(name: &str, function: &BinaryCase, a: f64, b: f64, h: f64) {
     let exact = function.values_at(a, b);
     let check = |what: &str, value: f64, (reference, rounding): (f64, f64)| {
@@ -114,7 +116,7 @@ fn functions_of_one_argument_against_differences() {
     }
 }
 
-/// Values of first and second derivatives that are known in closed form.
+/// First and second derivatives against closed forms.
 #[test]
 fn functions_of_one_argument_against_closed_values() {
     use Unary::*;
@@ -151,7 +153,7 @@ fn functions_of_one_argument_against_closed_values() {
     ];
     for (function, a, first, second) in cases {
         let [_, f_a, _, f_aa, _, _] = unary(function).values_at(a, 0.0);
-        // A handful of operations, each within 2 ulp, none of which cancels at these points.
+        // A few operations, each within 2 ulp, without cancellation at these points.
         let close =
             |value: f64, reference: f64| (value - reference).abs() <= 16.0 * f64::EPSILON * reference.abs();
         assert!(close(f_a, first), "{function:?}' at {a}: {f_a} instead of {first}");
@@ -190,7 +192,7 @@ fn functions_of_two_arguments() {
     }
 }
 
-/// Both operands are the same, depend on each other, or one is constant.
+/// Operands that are equal, that depend on each other, or of which one is constant.
 #[test]
 fn operands_that_are_not_independent() {
     type Build = fn(E, E) -> Node;
@@ -233,14 +235,14 @@ fn powers() {
             check_differences(&format!("powf {exponent}"), &derivatives, a, 0.0, 1.0 / 512.0);
         }
     }
-    // Finite derivatives at zero stay finite.
+    // Derivatives that are finite at zero are computed as finite numbers.
     assert_eq!(BinaryCase::new(|a, _| a.powf(2.5).1).values_at(0.0, 0.0), [0.0; 6]);
     assert_eq!(BinaryCase::new(|a, _| a.powf(1.5).1).values_at(0.0, 0.0)[..2], [0.0; 2]);
     assert_eq!(BinaryCase::new(|a, _| a.powi(3).1).values_at(0.0, 0.0), [0.0; 6]);
     assert_eq!(BinaryCase::new(|a, _| a.powf(2.0).1).values_at(0.0, 0.0)[3], 2.0);
     let power = BinaryCase::new(|a, b| a.binary(Binary::Powf, b).1).values_at(0.0, 3.0);
     assert_eq!(power, [0.0; 6]);
-    // Where the derivative is infinite it is not finite.
+    // An infinite derivative is not finite.
     assert!(!BinaryCase::new(|a, _| a.powf(0.5).1).values_at(0.0, 0.0)[1].is_finite());
     assert!(!BinaryCase::new(|a, _| a.powf(1.5).1).values_at(0.0, 0.0)[3].is_finite());
     assert_eq!(BinaryCase::new(|a, _| a.powi(i32::MIN).1).values_at(1.0, 0.0)[1], f64::from(i32::MIN));
@@ -275,7 +277,7 @@ fn selection_differentiates_the_branch_taken() {
     check_differences("√min(a b, a)", &minimum, 2.0, 1.7, 1.0 / 512.0);
 }
 
-/// The same, however a Jacobian is accumulated, and for a root that two conditions guard.
+/// The same for all orders of accumulation, and for a root guarded by two conditions.
 #[test]
 fn the_branch_not_taken_is_singular() {
     let graph = RefCell::new(Graph::default());
@@ -299,7 +301,7 @@ fn the_branch_not_taken_is_singular() {
     }
 }
 
-/// A selection of constants has no derivative, and a condition none either.
+/// Selections of constants, and conditions, have no derivatives.
 #[test]
 fn conditions_are_not_differentiated() {
     let step = BinaryCase::new(|a, b| a.if_less(b, a.of(1.0), a.of(-1.0)).1);
@@ -308,7 +310,7 @@ fn conditions_are_not_differentiated() {
     }
 }
 
-/// Of tables only that their derivatives fit to each other: what stands for them are sines.
+/// Derivatives of tables are consistent: tables are represented by sines.
 #[test]
 fn tables_are_differentiated_by_their_orders() {
     use crate::graph::Table;
@@ -340,7 +342,7 @@ fn tables_are_differentiated_by_their_orders() {
             assert!((found - expected).abs() < 1e-14, "{found} {expected}");
         }
     }
-    // Differences of what stands for tables.
+    // Differences of the sines that represent tables.
     let h = 1e-5;
     let value = |a, b| two.values_at(a, b)[0];
     assert!(((value(a + h, b) - value(a - h, b)) / (2.0 * h) - expected[1][1]).abs() < 1e-9);

@@ -1,12 +1,12 @@
-//! Constructors keep bits, and simplify what they say.
+//! Constructors preserve bits, and simplify as documented.
 
 use super::expression::{E, Random};
 use crate::graph::evaluate::{binary_value, unary_value};
 use crate::graph::{Binary, Compare, EvaluationPoint, Graph, Unary};
 use std::cell::RefCell;
 
-/// Random expressions full of zeros, ones, negations and powers of two against the same operations
-/// on numbers, bit by bit.
+/// Random expressions with many zeros, ones, negations and powers of two against the same
+/// operations on numbers, bit by bit.
 #[test]
 fn bits_are_kept() {
     let functions = [Unary::Neg, Unary::Neg, Unary::Neg, Unary::Abs, Unary::Sin, Unary::Tanh, Unary::Signum];
@@ -27,7 +27,7 @@ fn bits_are_kept() {
             let (expression, value) = match random.below(12) {
                 0..4 => {
                     let function = functions[random.below(functions.len())];
-                    // The sign of a zero is not kept.
+                    // The sign of a zero is not preserved.
                     if function == Unary::Signum && a == 0.0 {
                         continue;
                     }
@@ -46,8 +46,8 @@ fn bits_are_kept() {
                     (expressions[i].binary(operator, expressions[j]), binary_value(operator, a, b))
                 }
             };
-            // Structural zeros differ where something is infinite or not a number; magnitudes are
-            // kept so that nothing overflows or is subnormal on the way.
+            // Structural zeros differ for infinite values and NaN; magnitudes are limited, so that
+            // nothing overflows or is subnormal.
             if value == 0.0 || (1e-9..1e9).contains(&value.abs()) {
                 expressions.push(expression);
                 values.push(value);
@@ -97,7 +97,7 @@ fn neutral_elements_and_signs() {
     same(a.powi(2), a * a);
     same(a.powi(-1), 1.0 / a);
     same(a.of(2.0).sqrt(), a.of(2f64.sqrt()));
-    // 1/3 is not exact: a division stays one.
+    // 1/3 is not exact: the division remains.
     assert_ne!((a / 3.0).1, (a * (1.0 / 3.0)).1);
     // Subtraction does not commute.
     assert_ne!((a - b).1, (b - a).1);
@@ -127,7 +127,7 @@ fn conditions_are_folded() {
         assert_eq!(and, if truth { open } else { condition });
         assert_eq!(or, if truth { condition } else { open });
     }
-    // A comparison with itself is false for NaN: only `<` is known.
+    // A comparison of a number with itself is false for NaN: only `<` is known.
     let itself = g.compare(Compare::Le, a, a);
     assert_eq!(g.known_condition(itself), None);
     assert_eq!(g.select(open, a, a), a);

@@ -1,4 +1,4 @@
-//! Methods of iterators: those that adapt them, search them, or change them in place.
+//! Methods of iterators that adapt, search, or change them.
 
 use super::iterator::{Iter, holds, into_iter, option_content};
 use super::{Call, Receiver, option};
@@ -94,12 +94,12 @@ fn mutating_method(
     Ok(Some(value))
 }
 
-/// Methods that stop early.
+/// Short-circuiting methods.
 fn searching_method(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Value> {
     let (closure, at) = (call.only()?, call.at);
     match call.name {
         "any" | "all" => {
-            // Conditions at run time are collected: all elements are looked at then.
+            // Run-time conditions are combined over all elements.
             let any = call.name == "any";
             let mut result = Value::Bool(!any);
             loop {
@@ -107,7 +107,7 @@ fn searching_method(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> 
                     Some(value) => evaluator.call(closure, vec![value], at).map(Some),
                     None => Ok(None),
                 };
-                // What the closure changes depends on those before.
+                // The changes of the closure depend on the preceding results.
                 let holds = match result {
                     Value::Condition(node) => {
                         let undecided = if any { evaluator.graph.not(node) } else { node };

@@ -1,8 +1,8 @@
 //! Algebra of small nalgebra matrices.
 //!
-//! Sums and products are in nalgebra's order, so that the bits are those of the plain function:
-//! `dot` of 2, 3 and 4 elements is unrolled there, of more than 7 it has eight accumulators;
-//! products of matrices sum over columns from the first to the last.
+//! Sums and products have nalgebra's order, so that results are bitwise equal: its `dot` is
+//! unrolled for 2, 3 and 4 elements, and has eight accumulators for more than 7; products of
+//! matrices sum over columns from the first to the last.
 
 use super::Call;
 use super::block::column;
@@ -13,7 +13,7 @@ use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
 
-/// An operator of which one side is a matrix. `None` if there is no such operator.
+/// An operator with a matrix as one operand. `None` if there is no such operator.
 pub fn operator(
     evaluator: &mut Evaluator,
     operator: Operator,
@@ -116,7 +116,7 @@ pub(super) fn dot(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSp
     Ok(sum.unwrap_or_else(|| evaluator.graph.constant(0.0)))
 }
 
-/// Column after column, as nalgebra does it.
+/// In column-major order, as nalgebra.
 pub(super) fn norm_squared(evaluator: &mut Evaluator, matrix: &Matrix, at: TokenSpan) -> Result<Node> {
     let mut sum = evaluator.graph.constant(0.0);
     for c in 0..matrix.columns {

@@ -136,7 +136,7 @@ fn slicing_method(evaluator: &mut Evaluator, elements: &[Value], call: &Call) ->
     Ok(Value::iterator(Iter::of(parts)))
 }
 
-/// Methods that split, and those that give out `&mut` to parts.
+/// Methods that split, and those that return `&mut` to parts.
 fn splitting_method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,

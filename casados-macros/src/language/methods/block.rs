@@ -10,7 +10,7 @@ use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
 
-/// Methods that give parts: `column`, `fixed_rows::<3>(0)`, `fixed_view_mut::<3, 3>(0, 0)`, ..
+/// Methods that return parts: `column`, `fixed_rows::<3>(0)`, `fixed_view_mut::<3, 3>(0, 0)`, ..
 pub(super) fn blocks(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
@@ -173,7 +173,7 @@ pub(super) fn row(matrix: &Matrix, row: usize) -> Matrix {
     Matrix { rows: 1, columns: matrix.columns, elements }
 }
 
-/// All pairs, the second index running fastest.
+/// All pairs; the second index runs fastest.
 pub(super) fn pairs(outer: usize, inner: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..outer).flat_map(move |a| (0..inner).map(move |b| (a, b)))
 }

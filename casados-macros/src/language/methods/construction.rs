@@ -7,7 +7,7 @@ use crate::language::value::{Builtin, Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
 
-/// `SVector::from(array)`, `into()`: numbers are a column, arrays of numbers are columns.
+/// `SVector::from(array)`, `into()`: numbers become a column, arrays of numbers become columns.
 pub fn from_arrays(
     evaluator: &mut Evaluator,
     elements: &[Value],
@@ -79,7 +79,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
                 evaluator.call(closure, vec![Value::usize(r), Value::usize(c)], at)
             })?
         }
-        // Elements row after row, as one reads a matrix.
+        // Elements in row-major order.
         "new" => {
             let (rows, columns) = size(evaluator)?;
             let elements = reals(evaluator, &call.arguments, at)?;
@@ -117,7 +117,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
     }))
 }
 
-/// The size of a matrix that has to be known.
+/// The size of a matrix, which must be known.
 fn known_size(
     evaluator: &mut Evaluator,
     name: &str,
@@ -138,7 +138,7 @@ fn known_size(
     }
 }
 
-/// A matrix of a list of its elements.
+/// A matrix from a list of its elements.
 fn from_list(
     evaluator: &mut Evaluator,
     name: &str,
@@ -186,7 +186,7 @@ fn from_fn(
     Ok(Value::matrix(rows, columns, elements))
 }
 
-/// Numbers of an iterator, at most as many as there are elements.
+/// Numbers of an iterator, at most the number of elements.
 fn take_elements(evaluator: &mut Evaluator, call: &Call, size: Option<(usize, usize)>) -> Result<Vec<Value>> {
     let at = call.at;
     let mut elements = Vec::new();

@@ -1,4 +1,4 @@
-//! Methods that read an iterator to its end.
+//! Methods that consume an iterator.
 
 use super::iterator::Iter;
 use super::{Call, float, function};
@@ -68,7 +68,7 @@ pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result
     Ok(Some(value))
 }
 
-/// One value out of all.
+/// Methods that reduce all elements to one value.
 fn reducing_method(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
     let at = call.at;
     Ok(match call.name {
@@ -98,8 +98,7 @@ fn reducing_method(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Re
             }
             Value::some(accumulated)
         }
-        // Sums begin with the first element: to add it to zero changes no bits but the sign of a
-        // zero.
+        // Sums start with the first element: adding it to zero changes only the sign of a zero.
         _ => {
             let operator = if call.name == "sum" { Operator::Add } else { Operator::Mul };
             let Some(first) = iter.next(evaluator, at)? else {
@@ -114,7 +113,7 @@ fn reducing_method(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Re
     })
 }
 
-/// The sum or product of nothing.
+/// The empty sum or product.
 fn empty_result(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     let given = call.turbofish.iter().find_map(|generic| match generic {
         Generic::Type(Type::Unknown) | Generic::Const(_) => None,
@@ -129,8 +128,8 @@ fn empty_result(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     }
 }
 
-/// The smallest or largest element of those that are known: the last of several largest, the first
-/// of several smallest.
+/// The smallest or largest of known elements: the last of several largest, the first of several
+/// smallest.
 fn extreme(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
     let at = call.at;
     let largest = call.name.starts_with("max");

@@ -1,8 +1,8 @@
 //! Methods and constants of `f64`.
 //!
-//! Each is built from the graph's functions such that the bits are those of the method, with four
-//! exceptions: `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, as
-//! `copysign` of a NaN is, and `powi` of a graph is that of the scalar it runs on.
+//! Each is built from functions of the graph with bitwise equal results, with four exceptions:
+//! `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, `copysign` of a NaN is
+//! NaN, and `powi` is that of the scalar type.
 
 use super::Call;
 use crate::graph::{Binary, Compare, Node, Unary};
@@ -140,7 +140,7 @@ const KNOWN_NUMBER_METHODS: &[&str] = &[
     "is_finite", "is_infinite", "is_sign_positive", "is_sign_negative", "total_cmp", "partial_cmp", "to_bits",
 ];
 
-/// Whether `f64` has a method of its own of a name, not by a trait.
+/// Whether `f64` has an inherent method of this name.
 pub fn is_inherent(name: &str) -> bool {
     unary(name).is_some()
         || KNOWN_NUMBER_METHODS.contains(&name) && name != "partial_cmp"
@@ -148,7 +148,7 @@ pub fn is_inherent(name: &str) -> bool {
         || matches!(name, "max" | "min" | "clamp" | "copysign" | "to_radians" | "to_degrees")
 }
 
-/// Methods without a useful derivative: of numbers that are known, they are known too.
+/// Methods without a useful derivative: for known numbers the result is known.
 fn known_number_method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value>> {
     if !KNOWN_NUMBER_METHODS.contains(&call.name) {
         return Ok(None);
@@ -177,7 +177,7 @@ fn known_number_method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Resul
     Ok(Some(Value::Real(evaluator.graph.constant(value))))
 }
 
-/// The arguments as numbers.
+/// The arguments as nodes.
 fn argument_nodes<const N: usize>(evaluator: &mut Evaluator, call: &Call) -> Result<[Node; N]> {
     call.expect_argument_count(N)?;
     let mut numbers = [Node(0); N];

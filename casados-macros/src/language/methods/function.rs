@@ -1,4 +1,4 @@
-//! Functions and constants of the language that are named by path.
+//! Functions and constants of the language called by path.
 
 use super::iterator::{self, Iter};
 use super::{Call, float, integer, matrix, table};
@@ -22,7 +22,7 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
     }
     let of_user = matches!(function.path[0].as_str(), "crate" | "super" | "self");
     let value = match (before, name) {
-        // What is in the user's own modules is none of these, whatever they are called.
+        // Functions of the user's own modules are excluded, whatever their names.
         _ if function.owner.is_none() && of_user => return Ok(None),
         ("array", "from_fn") => from_fn(evaluator, call)?,
         ("array", "from_ref") | ("convert", "identity") => call.only()?.clone(),
@@ -152,7 +152,7 @@ fn from_fn(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     Ok(Value::array(elements))
 }
 
-/// The length that the context or a const argument gives.
+/// The length from the context or a const argument.
 fn array_length(call: &Call) -> Result<usize> {
     let given = call.constant().and_then(|length| usize::try_from(length).ok());
     let expected = match call.expected {
@@ -167,7 +167,7 @@ fn array_length(call: &Call) -> Result<usize> {
     })
 }
 
-/// The place behind a `&mut`.
+/// The place of a `&mut`.
 fn reference(value: &Value, at: TokenSpan) -> Result<Place> {
     match value {
         Value::Reference(place) => Ok(place.clone()),
@@ -175,7 +175,7 @@ fn reference(value: &Value, at: TokenSpan) -> Result<Place> {
     }
 }
 
-/// Zero, and what is made of zeros.
+/// The default value: zeros.
 pub fn default(evaluator: &mut Evaluator, ty: &Type, at: TokenSpan) -> Result<Value> {
     Ok(match ty {
         Type::Integer(ty) => Value::Integer(Integer { value: 0, ty: Some(*ty) }),
@@ -206,7 +206,7 @@ pub fn default(evaluator: &mut Evaluator, ty: &Type, at: TokenSpan) -> Result<Va
             if definition.is_enum {
                 return Err(error(at, "the default of an enum is not known here: name the variant"));
             }
-            // Derived.
+            // The derived implementation.
             let types = evaluator.field_types(definition, 0, arguments)?;
             let fields = types.iter().map(|ty| default(evaluator, ty, at)).collect::<Result<_>>()?;
             Value::Struct(Rc::new(Struct { definition: definition.clone(), variant: 0, fields }))

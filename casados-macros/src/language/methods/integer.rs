@@ -92,7 +92,7 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
     }
 }
 
-/// Whether a method has integers for its arguments.
+/// Whether the arguments of a method are integers.
 fn takes_integers(name: &str) -> bool {
     matches!(
         name,
@@ -121,7 +121,7 @@ fn takes_integers(name: &str) -> bool {
     )
 }
 
-/// Whether integers have a method of their own of a name, not by a trait.
+/// Whether integers have an inherent method of this name.
 pub fn is_inherent(name: &str) -> bool {
     takes_integers(name) && !matches!(name, "min" | "max" | "clamp")
         || matches!(name, "abs" | "unsigned_abs" | "signum" | "isqrt" | "is_power_of_two" | "is_positive")

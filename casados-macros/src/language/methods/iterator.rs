@@ -1,6 +1,6 @@
-//! Iterators: lazy, double-ended, pulled by `for` and by consuming methods.
+//! Iterators: lazy, double-ended, advanced by `for` and by consuming methods.
 //!
-//! Closures run when an element is pulled, in the order in which Rust runs them.
+//! Closures run when an element is requested, in the order of Rust.
 
 mod adapters;
 mod ends;
@@ -22,57 +22,57 @@ pub enum Iter {
     Range { front: i128, back: i128, ty: Option<IntegerType> },
     /// An iterator in a variable: `by_ref`, `&mut iterator`.
     ByRef(Place),
-    /// The same value for ever.
+    /// The same value repeatedly.
     Repeat(Value),
     /// Calls a closure for each element.
     FromFn(Value),
-    /// The next element, and a closure that makes the one after it.
+    /// The next element, and a closure that computes its successor.
     Successors(Option<Box<Value>>, Value),
     /// Pairs.
     Zip(Box<Iter>, Box<Iter>),
     /// Pairs of the index and the element.
     Enumerate(Box<Iter>, usize),
-    /// Elements through a closure.
+    /// Elements mapped by a closure.
     Map(Box<Iter>, Value),
     /// Elements for which a closure holds.
     Filter(Box<Iter>, Value),
-    /// The elements that a closure makes some of.
+    /// The values of `Some` returned by a closure.
     FilterMap(Box<Iter>, Value),
-    /// As long as a closure holds; `None` once it did not.
+    /// Elements while a closure holds; `None` afterwards.
     TakeWhile(Option<Box<Iter>>, Value),
-    /// From where a closure does not hold; the closure is gone then.
+    /// Elements from the first for which a closure does not hold; the closure is then dropped.
     SkipWhile(Box<Iter>, Option<Value>),
-    /// As long as a closure makes some; `None` once it did not.
+    /// Values while a closure returns `Some`; `None` afterwards.
     MapWhile(Option<Box<Iter>>, Value),
     /// A closure with a state, which copies of the iterator do not share.
     Scan { inner: Box<Iter>, state: Value, closure: Value },
-    /// From the back.
+    /// Reversed.
     Rev(Box<Iter>),
-    /// The first so many.
+    /// The first elements.
     Take(Box<Iter>, usize),
-    /// Without the first so many.
+    /// All but the first elements.
     Skip(Box<Iter>, usize),
-    /// Every `step`-th; the first one comes at once.
+    /// Every `step`-th element, starting with the first.
     StepBy { inner: Box<Iter>, step: usize, begun: bool },
-    /// One after the other.
+    /// Two iterators in succession.
     Chain(Option<Box<Iter>>, Box<Iter>),
-    /// The elements of the elements, of which the first and the last are open.
+    /// The elements of nested iterators; the first and the last one are open.
     Flatten { inner: Box<Iter>, front: Option<Box<Iter>>, back: Option<Box<Iter>> },
-    /// Again and again.
+    /// Repeated endlessly.
     Cycle { original: Box<Iter>, now: Box<Iter> },
-    /// With a look at the next one.
+    /// With the peeked element, if any.
     Peekable(Box<Iter>, Option<Option<Box<Value>>>),
-    /// A closure that only looks.
+    /// A closure that inspects each element.
     Inspect(Box<Iter>, Value),
 }
 
 impl Iter {
-    /// All of some values.
+    /// An iterator over values.
     pub fn of(values: Vec<Value>) -> Iter {
         Iter::Elements { front: 0, back: values.len(), array: Rc::new(values) }
     }
 
-    /// How many elements are left. An error if that is known only after they are read.
+    /// The number of remaining elements. An error if it is unknown before they are read.
     pub fn length(&self, evaluator: &mut Evaluator, at: TokenSpan) -> Result<usize> {
         Ok(match self {
             Iter::Elements { front, back, .. } | Iter::Places { front, back, .. } => {
@@ -116,7 +116,7 @@ pub(super) fn option_content(value: Value, at: TokenSpan) -> Result<Option<Value
     }
 }
 
-/// Whether a predicate holds: it must be known.
+/// Whether a predicate holds, which must be known.
 pub(super) fn holds(
     evaluator: &mut Evaluator,
     closure: &Value,
@@ -162,7 +162,7 @@ pub fn into_iter(evaluator: &mut Evaluator, value: Value, at: TokenSpan) -> Resu
     }
 }
 
-/// `&mut` to each element of a matrix, column after column.
+/// `&mut` to each element of a matrix, in column-major order.
 fn element_places(
     evaluator: &mut Evaluator,
     place: &Place,

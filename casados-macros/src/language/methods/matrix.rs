@@ -29,7 +29,7 @@ pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> 
     (row < rows && column < columns).then_some((row, column))
 }
 
-/// The length of a difference: squares are summed one after the other, not as `dot` does it.
+/// The norm of a difference: squares are summed in order, unlike in `dot`.
 fn distance(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSpan) -> Result<Node> {
     let mut squared = evaluator.graph.constant(0.0);
     for element in &zip(evaluator, a, b, Binary::Sub, at)?.elements {
@@ -40,7 +40,7 @@ fn distance(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSpan) ->
     Ok(evaluator.graph.unary(Unary::Sqrt, squared))
 }
 
-/// Whether nalgebra has a method of a name, which all take `&self`.
+/// Whether nalgebra has a method of this name; all take `&self`.
 #[rustfmt::skip]
 pub fn is_inherent(name: &str) -> bool {
     const NAMES: &[&str] = &[
@@ -235,7 +235,7 @@ fn transposed_product(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Cal
     Ok(Some(Value::matrix(matrix.columns, other.columns, elements)))
 }
 
-/// The product of each element with the whole of another matrix.
+/// The Kronecker product.
 fn kronecker(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let other = argument(evaluator, call, 0)?;
@@ -249,11 +249,11 @@ fn kronecker(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Res
     Ok(Some(Value::matrix(matrix.rows * other.rows, matrix.columns * other.columns, elements)))
 }
 
-/// Between two matrices.
+/// Linear interpolation between two matrices.
 fn lerp(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     call.expect_argument_count(2)?;
-    // nalgebra: rhs * t, then self * (1 - t) added.
+    // In nalgebra: rhs * t, then self * (1 - t) is added.
     let other = argument(evaluator, call, 0)?;
     same_shape(matrix, &other, call)?;
     let t = evaluator.real(&call.arguments[1], at)?;
@@ -264,7 +264,7 @@ fn lerp(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<O
     evaluator.binary(Operator::Add, &a, &b, at).map(Some)
 }
 
-/// Methods that rearrange, and iterators.
+/// Methods that rearrange elements, and iterators.
 fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let Matrix { rows, columns, .. } = **matrix;
@@ -366,7 +366,7 @@ fn transpose(matrix: &Matrix) -> Matrix {
     Matrix { rows: columns, columns: rows, elements }
 }
 
-/// A matrix as an array of columns, a vector as an array of numbers unless it shall be nested.
+/// A matrix as an array of columns; a vector as an array of numbers unless `nested`.
 pub fn to_arrays(matrix: &Matrix, nested: bool) -> Value {
     if nested {
         let columns = matrix.elements.chunks(matrix.rows.max(1));

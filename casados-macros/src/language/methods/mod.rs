@@ -1,5 +1,4 @@
-//! Methods and functions that belong to the language: those of `f64`, integers, arrays, iterators,
-//! nalgebra.
+//! Built-in methods and functions: those of `f64`, integers, arrays, iterators, nalgebra.
 
 mod adapter;
 mod algebra;
@@ -23,7 +22,7 @@ use super::types::Type;
 use super::value::{Builtin, Generic, Value};
 use syn::Result;
 
-/// What a method is called on: a place if it is one (`iter_mut`, `swap`, `next` change it), with
+/// The receiver of a method: its place if it has one (`iter_mut`, `swap`, `next` change it), with
 /// mutable references followed.
 #[derive(Clone, Debug)]
 pub enum Receiver {
@@ -49,11 +48,11 @@ pub struct Call<'a> {
     pub name: &'a str,
     /// Generic arguments: `sum::<f64>()`.
     pub turbofish: &'a [Generic],
-    /// Arguments; the receiver is not one of them.
+    /// The arguments without the receiver.
     pub arguments: Vec<Value>,
-    /// The type that the context expects of the result, as far as it is known.
+    /// The expected type of the result, as far as it is known.
     pub expected: &'a Type,
-    /// What errors point at.
+    /// The tokens of errors.
     pub at: TokenSpan<'a>,
 }
 
@@ -69,13 +68,13 @@ impl Call<'_> {
         ))
     }
 
-    /// The argument of a call that has one.
+    /// The only argument of a call.
     fn only(&self) -> Result<&Value> {
         self.expect_argument_count(1)?;
         Ok(&self.arguments[0])
     }
 
-    /// The length that a const argument gives: `from_fn::<_, 3, _>`.
+    /// The length of a const argument: `from_fn::<_, 3, _>`.
     fn constant(&self) -> Option<i128> {
         self.turbofish.iter().find_map(|generic| match generic {
             Generic::Const(value) => Some(value.value),
@@ -113,7 +112,7 @@ pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Re
     common(evaluator, value, call)
 }
 
-/// Whether a number or a matrix has a method of its own of a name, which hides those of traits.
+/// Whether a number or a matrix has an inherent method of this name, which hides those of traits.
 pub fn is_inherent(ty: &Type, name: &str) -> bool {
     match ty {
         Type::Real => float::is_inherent(name),
@@ -123,12 +122,12 @@ pub fn is_inherent(ty: &Type, name: &str) -> bool {
     }
 }
 
-/// Whether a method is one that every value has.
+/// Whether every value has this method.
 fn is_common(name: &str) -> bool {
     matches!(name, "clone" | "to_owned" | "borrow" | "as_ref" | "into" | "try_into")
 }
 
-/// Methods that every value has.
+/// Methods of every value.
 fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option<Value>> {
     if !is_common(call.name) {
         return Ok(None);
@@ -159,7 +158,7 @@ fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option
     }))
 }
 
-/// `From` and `Into` between numbers, arrays and matrices; to an unknown type the value itself.
+/// `From` and `Into` between numbers, arrays and matrices; the value itself if the type is unknown.
 pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: TokenSpan) -> Result<Value> {
     match (&value, ty) {
         (Value::Integer(integer), Type::Real) => {
@@ -181,19 +180,19 @@ pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: TokenSpan
     }
 }
 
-/// A call of a function that is named by path: `core::array::from_fn`, `Vector3::new`, `f64::from`.
-/// `None` if there is no such function. `f64::sqrt(x)` is tried as `x.sqrt()` after that.
+/// A function called by path: `core::array::from_fn`, `Vector3::new`, `f64::from`. `None` if there
+/// is no such function; `f64::sqrt(x)` is then tried as `x.sqrt()`.
 pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Result<Option<Value>> {
     function::call(evaluator, function, call)
 }
 
-/// A constant that is named by path: `core::f64::consts::PI`, `f64::EPSILON`. `None` if there is no
-/// such constant.
+/// A constant named by path: `core::f64::consts::PI`, `f64::EPSILON`. `None` if there is no such
+/// constant.
 pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
     function::constant(evaluator, path)
 }
 
-/// An operator of which one side is a matrix. `None` if there is no such operator.
+/// An operator with a matrix as one operand. `None` if there is no such operator.
 pub fn matrix_operator(
     evaluator: &mut Evaluator,
     operator: super::arithmetic::Operator,

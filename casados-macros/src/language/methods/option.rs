@@ -7,7 +7,7 @@ use crate::language::place::{Place, Projection};
 use crate::language::value::Value;
 use syn::Result;
 
-/// A method of an option, or of a result, of which only the value is kept. `None` if there is no
+/// A method of an option, or of a result, of which only the value is stored. `None` if there is no
 /// such method.
 pub fn method(
     evaluator: &mut Evaluator,
@@ -74,7 +74,7 @@ pub fn method(
     Ok(Some(value))
 }
 
-/// A method of a `bool` that is known. `None` if there is no such method.
+/// A method of a known `bool`. `None` if there is no such method.
 pub fn bool_method(evaluator: &mut Evaluator, known: bool, call: &Call) -> Result<Option<Value>> {
     Ok(match call.name {
         "then" | "then_some" if !known => Some(Value::Option(None)),
@@ -84,8 +84,7 @@ pub fn bool_method(evaluator: &mut Evaluator, known: bool, call: &Call) -> Resul
     })
 }
 
-/// Something that can be read, changed and written back: what `next` of an iterator in a variable
-/// does.
+/// Writes a changed value back to its place, as `next` of an iterator in a variable.
 pub fn update(evaluator: &mut Evaluator, receiver: &Receiver, value: Value, call: &Call) -> Result<()> {
     match receiver {
         Receiver::Place(place) => evaluator.write(place, value, call.at),

@@ -1,4 +1,4 @@
-//! Tables of `casados::tables`: how they are made of numbers, and their methods.
+//! Tables of `casados::tables`: constructors and methods.
 
 use super::Call;
 use crate::graph::{self, Binary, Node, Unary};
@@ -10,11 +10,11 @@ use quote::{format_ident, quote};
 use std::rc::Rc;
 use syn::Result;
 
-/// The degree of cubic splines, and of what may be one.
+/// The degree of cubic splines, and of tables that may be one.
 const CUBIC: u8 = 3;
 
-/// A table by the type and the function that makes it, with the number of its variables, that of
-/// the function's arguments, and its degree.
+/// A table by its type and constructor: the numbers of variables and of the constructor's
+/// arguments, and the degree.
 fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
     Some(match (ty, function) {
         ("Linear", "new") => ("Linear", 1, 2, 1),
@@ -26,7 +26,7 @@ fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
     })
 }
 
-/// `Spline::natural(points, values)` and the others. `None` if it is none of them.
+/// `Spline::natural(points, values)` and the other constructors. `None` for other functions.
 pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Option<Value>> {
     let Some((name, variables, arguments, degree)) = form(ty, call.name) else { return Ok(None) };
     call.expect_argument_count(arguments)?;
@@ -42,7 +42,7 @@ pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Opt
     Ok(Some(Value::Table(Rc::new(Interpolation { name, variables, degree, expression }))))
 }
 
-/// Numbers and arrays of them as they are emitted.
+/// Numbers and nested arrays as tokens.
 fn numeric_tokens(evaluator: &mut Evaluator, value: &Value, at: TokenSpan) -> Result<TokenStream> {
     Ok(match evaluator.follow_value(value.clone(), at)? {
         Value::Opaque(tokens) => (*tokens).clone(),
@@ -75,7 +75,7 @@ fn numeric_tokens(evaluator: &mut Evaluator, value: &Value, at: TokenSpan) -> Re
     })
 }
 
-/// Whether points increase, as far as they are known here; the compiler asks the others.
+/// Checks that known points increase; the compiler checks the others.
 fn increasing(evaluator: &mut Evaluator, points: &Value, at: TokenSpan) -> Result<()> {
     let Value::Array(points) = evaluator.follow_value(points.clone(), at)? else { return Ok(()) };
     let known = |value: &Value| match value {
@@ -117,7 +117,7 @@ pub fn method(evaluator: &mut Evaluator, of: &Interpolation, call: &Call) -> Res
     evaluate_table(evaluator, &of.expression, of.degree, call)
 }
 
-/// A method of a constant that is defined where the macro does not see it.
+/// A method of a constant defined outside of the macro's input.
 pub fn opaque_table_method(evaluator: &mut Evaluator, of: &TokenStream, call: &Call) -> Result<Value> {
     let value = evaluate_table(evaluator, of, CUBIC, call)?;
     value.ok_or_else(|| error(call.at, "a table has one or two variables"))
@@ -163,7 +163,7 @@ fn bivariate_value(evaluator: &mut Evaluator, table: graph::Table<2>, [a, b]: [N
 }
 
 impl Evaluator {
-    /// The index of a table: equal expressions are one.
+    /// The index of a table; equal expressions share it.
     fn table(&mut self, expression: &TokenStream, variables: usize) -> u32 {
         let text = expression.to_string();
         let same = |table: &Table| table.variables == variables && table.expression.to_string() == text;

@@ -1,4 +1,4 @@
-//! Patterns that have parts: tuples, slices, structs.
+//! Compound patterns: tuples, slices, structs.
 
 use super::{Bindings, Subject, Truth};
 use crate::language::evaluator::{Evaluated, Evaluator, TokenSpan, error};
@@ -69,7 +69,7 @@ impl Evaluator {
     ) -> Evaluated<Truth> {
         let subject = match subject {
             Subject::Value(value @ Value::Opaque(_)) => {
-                // `let [a, b] = CONSTANT;` tells the length.
+                // `let [a, b] = CONSTANT;` determines the length.
                 let ty = Type::Array(Rc::new(Type::Real), Some(slice.elems.len()));
                 Subject::Value(self.coerce(value, &ty, slice)?)
             }
@@ -140,7 +140,7 @@ impl Evaluator {
     }
 }
 
-/// Whether a value of an enum is the variant that the path names; structs always are.
+/// Whether a value of an enum is the variant of the path; true for structs.
 fn is_variant(structure: &Struct, path: &syn::Path) -> bool {
     !structure.definition.is_enum
         || path

@@ -1,4 +1,4 @@
-//! What the evaluator refuses, and what it says.
+//! Errors of the evaluator, and their messages.
 
 use super::evaluate;
 
@@ -106,7 +106,7 @@ fn nesting_is_bounded() {
 }
 
 fn nested_errors() {
-    // The first of these are expressions, the others blocks, closures and calls.
+    // The first ones are expressions, the others blocks, closures and calls.
     const EXPRESSIONS: usize = 13;
     let forms = [
         ("(", ")"),
@@ -147,7 +147,7 @@ fn nested_errors() {
         if let Err(error) = evaluate(&source(depth)) {
             panic!("{depth} times {head} {tail}: {error}");
         }
-        // At most one, two, three brackets for a level: as deep as the parser is let, and deeper.
+        // At most one, two, three brackets per level: up to the limit of the parser, and deeper.
         for depth in [84, 126, 150, 250, 300] {
             if let Err(error) = evaluate(&source(depth)) {
                 let error = error.to_string();
@@ -174,7 +174,7 @@ fn dual_models_need_their_feature() {
     assert!(crate::language::dual::require_feature(&function, true).is_ok());
 }
 
-/// A capital makes a name in a pattern a constant where the pattern may fail.
+/// A capital letter makes a name in a refutable pattern a constant.
 #[test]
 fn constants_from_outside_in_patterns() {
     let source = "fn f(x: [f64; 6]) -> f64 {

@@ -1,5 +1,5 @@
 //! The evaluator against rustc: each function is compiled, and executed symbolically from its own
-//! tokens; both must yield the same numbers, bit by bit.
+//! tokens; both must return bitwise equal numbers.
 
 mod control;
 mod errors;
@@ -16,7 +16,7 @@ use crate::graph::EvaluationPoint;
 use crate::graph::Node;
 use std::rc::Rc;
 
-/// Points at which snippets are compared: signs differ, some numbers are equal, some are 0.
+/// Points for the comparison of snippets: signs differ, some numbers are equal, some are 0.
 pub const POINTS: [[f64; 6]; 5] = [
     [0.3, -1.7, 2.9, 0.11, -0.6, 5.3],
     [-0.3, 1.7, -2.9, -0.11, 0.6, -5.3],
@@ -25,7 +25,7 @@ pub const POINTS: [[f64; 6]; 5] = [
     [1e3, -1e-3, 7.25, -7.5, 0.125, 40.0],
 ];
 
-/// Numbers in a result, in order.
+/// Collects the numbers of a result, in order.
 pub trait CollectNumbers {
     fn numbers(&self, list: &mut Vec<f64>);
 }
@@ -61,7 +61,7 @@ fn nodes(evaluator: &mut Evaluator, value: &Value, list: &mut Vec<Node>) {
     }
 }
 
-/// Runs a test as compilers run macros: on a stack of 8 MiB.
+/// Runs a test with the stack size of macros in compilers, 8 MiB.
 pub fn on_compiler_stack(test: fn()) {
     let thread = std::thread::Builder::new().stack_size(8 << 20).spawn(test).unwrap();
     thread.join().unwrap();

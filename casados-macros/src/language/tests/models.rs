@@ -1,4 +1,4 @@
-//! Whole models: size, time, nesting.
+//! Complete models: size, time, nesting.
 
 use super::super::{Form, read};
 use quote::quote;
@@ -22,7 +22,8 @@ fn a_chain_of_any_length_is_linear_in_size() {
         println!("nx = {nx}: {:?}", start.elapsed());
         model.graph.operation_count(&model.residual)
     };
-    // Every further mass costs the same: one spring, one row of accelerations and of velocities.
+    // Every additional mass has the same cost: one spring, one row of accelerations and of
+    // velocities.
     let (a, b, c) = (operations(45), operations(51), operations(189));
     assert_eq!(c - b, 23 * (b - a));
 }
@@ -54,7 +55,7 @@ fn nested_models() {
     }
 }
 
-/// Sums as other programs write them, without a bracket; on the stack that an expansion has.
+/// Long sums without parentheses, as written by other programs; on the stack of an expansion.
 #[test]
 fn sums_of_thousands_of_terms() {
     let terms: Vec<String> = (0..3000).map(|i| format!("{i}.5 * x[{}]", i % 6)).collect();
@@ -69,7 +70,7 @@ fn sums_of_thousands_of_terms() {
     assert_eq!(value, [4_500_000.0]);
 }
 
-/// What nests without brackets ends in an error at the user's tokens.
+/// Deep nesting without parentheses is an error at the user's tokens.
 #[test]
 fn long_chains_are_errors() {
     let condition = |i: usize| format!("if x[0] < {i}.0 {{ {i}.0 }} else ");
@@ -88,7 +89,7 @@ fn long_chains_are_errors() {
     }
 }
 
-/// Modules that use each other, and names that are nowhere: an end in bounded time.
+/// Modules that use each other, and unknown names: resolved in bounded time.
 #[test]
 fn uses_that_lead_in_circles() {
     let names = ["a", "b", "c", "d", "e", "g"];

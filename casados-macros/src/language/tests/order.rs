@@ -1,4 +1,4 @@
-//! The order of execution, and what depends on it.
+//! The order of execution, and its effects.
 
 use super::same;
 

@@ -1,4 +1,4 @@
-//! Derivatives of a constraint in time.
+//! Time derivatives of a constraint.
 
 use super::variable_name;
 use crate::graph::{Binary, Graph, Node, tangent};
@@ -10,19 +10,19 @@ use syn::{Error, Result};
 pub struct Constraint {
     /// Its equation.
     pub equation: usize,
-    /// `g`, `dg/dt`, …; the last one takes the place of the equation.
+    /// `g`, `dg/dt`, …; the last one replaces the equation.
     pub levels: Vec<Node>,
 }
 
 impl Constraint {
-    /// How often it is differentiated.
+    /// The number of differentiations.
     pub fn differentiation_count(&self) -> usize {
         self.levels.len() - 1
     }
 
-    /// `Π_m (d/dt + r_m) g`, with as many of the rates as there are derivatives.
+    /// `Π_m (d/dt + r_m) g`, with one rate for each differentiation.
     pub fn stabilised(&self, graph: &mut Graph, rates: &[f64]) -> Node {
-        // Coefficients of the polynomial, the constant first.
+        // The coefficients of the polynomial, the constant one first.
         let mut coefficients = vec![1.0];
         for rate in rates.iter().take(self.differentiation_count()) {
             let mut product = vec![0.0; coefficients.len() + 1];
@@ -72,7 +72,8 @@ pub fn differentiate(
     Ok(Constraint { equation, levels })
 }
 
-/// A level that is differentiated once more depends on states, parameters and the time alone.
+/// Checks that a derivative that is differentiated once more depends on states, parameters and time
+/// only.
 fn check(model: &Model, level: Node, (equation, order): (usize, u32)) -> Result<()> {
     let names = &model.variables;
     let (nx, nz, nu) = (names.x.len() as u32, names.z.len() as u32, names.u.len() as u32);

@@ -1,12 +1,12 @@
 //! Index reduction: constraints are differentiated in time until the model has index 1.
 //!
-//! [`signature`] says how often each equation is differentiated. Equations that give a derivative
-//! explicitly, as `q̇ = v`, are [`rules`]: their derivatives are not needed, since `d/dt` of what
-//! depends on `q` has `v` in the place of `q̇`. What is left are constraints `g(x, p, t) = 0`. The
-//! highest derivative of each takes its place ([`constraints`]), all states stay, and the lower
-//! ones are the invariants. [`rank`] holds the result against sample points.
+//! [`signature`] determines the number of differentiations of each equation. Equations that define
+//! a derivative explicitly, as `q̇ = v`, are [`rules`]: they are not differentiated, since `d/dt`
+//! of a function of `q` contains `v` instead of `q̇`. The others are constraints `g(x, p, t) = 0`.
+//! Each is replaced by its highest derivative ([`constraints`]); all states remain, and the lower
+//! derivatives are the invariants. [`rank`] tests the result at sample points.
 //!
-//! With rates `r_m` of Baumgarte's stabilisation the place of a constraint is taken by
+//! With the rates `r_m` of Baumgarte's stabilisation a constraint is replaced by
 //! `Π_m (d/dt + r_m) g` (J. Baumgarte, Stabilization of constraints and integrals of motion in
 //! dynamical systems, 1972).
 
@@ -22,20 +22,20 @@ use crate::structure::index::{self, Words};
 use constraints::Constraint;
 use quote::format_ident;
 
-/// What became of a model whose index was reduced.
+/// The result of the index reduction of a model.
 pub struct ReducedModel {
-    /// Equations that were differentiated, and how often.
+    /// The differentiated equations, with the number of differentiations.
     pub differentiated: Vec<(u32, u32)>,
-    /// The rates of Baumgarte's stabilisation, for as many derivatives as there are.
+    /// The rates of Baumgarte's stabilisation, for as many derivatives as exist.
     pub rates: Vec<f64>,
     /// Constraints and their lower derivatives, equation by equation, as a function of the model's
     /// variables.
     pub invariants: Model,
-    /// The equations of the projection onto them, if they are wanted.
+    /// The equations of the projection onto the invariants, if requested.
     pub projection: Option<Model>,
 }
 
-/// Reduces the index if that is asked for and there is something to differentiate.
+/// Reduces the index if requested and necessary.
 pub fn reduce(model: &mut Model) -> syn::Result<Option<ReducedModel>> {
     let Some(reduction) = model.reduction.clone() else { return Ok(None) };
     let rows = signature(model);
@@ -85,7 +85,7 @@ pub fn times(count: usize) -> String {
     }
 }
 
-/// The signature matrix: unknowns are `(x, z)`.
+/// The signature matrix with the unknowns `(x, z)`.
 fn signature(model: &Model) -> Vec<signature::Row> {
     let (nx, nz) = (model.variables.x.len() as u32, model.variables.z.len() as u32);
     let row = |variables: Vec<u32>| {
@@ -102,7 +102,7 @@ fn signature(model: &Model) -> Vec<signature::Row> {
     model.graph.dependencies(&model.residual).into_iter().map(row).collect()
 }
 
-/// Equations that leave unknowns open, however often they are differentiated.
+/// The error about equations that leave unknowns undetermined after any number of differentiations.
 fn undetermined_error(model: &Model, rows: &[signature::Row]) -> syn::Error {
     let nx = model.variables.x.len();
     let pattern: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|entry| entry.0).collect()).collect();

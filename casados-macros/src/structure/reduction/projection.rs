@@ -1,7 +1,7 @@
 //! The equations of the projection onto invariants `y(x, p, t)`.
 //!
-//! `F = (x − x̂ + Gᵀν, y)` as a function of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: `ν` has the place
-//! of `z` and `x̂` that of `u`.
+//! `F = (x − x̂ + Gᵀν, y)` as a function of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: `ν` is stored as
+//! `z` and `x̂` as `u`.
 
 use crate::graph::{Binary, Node, gradient};
 use crate::language::units::Units;
@@ -14,7 +14,7 @@ pub fn of(invariants: &Model) -> Model {
     let Variables { x, z, u, p } = &invariants.variables;
     let count = invariants.residual.len();
     let mut graph = invariants.graph.clone();
-    // Parameters and the time have other places among the variables.
+    // Parameters and time have other indices among the variables.
     let (old, new) = (2 * x.len() + z.len() + u.len(), 2 * x.len() + count + x.len());
     let moved: BTreeMap<u32, Node> =
         (0..=p.len()).map(|index| ((old + index) as u32, graph.variable((new + index) as u32))).collect();

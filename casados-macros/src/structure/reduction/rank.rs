@@ -1,5 +1,5 @@
-//! The matrix `∂f/∂(ẋ, z)` of the reduced model at sample points: structure alone does not show
-//! that constraints repeat each other.
+//! The rank of the matrix `∂f/∂(ẋ, z)` of the reduced model at sample points: redundant constraints
+//! are not a structural property.
 
 use super::variable_name;
 use crate::graph::Node;
@@ -7,16 +7,17 @@ use crate::structure::samples;
 use crate::structure::{Analysis, samplings};
 use syn::{Error, Result};
 
-/// Pivots below this, relative to the largest of a scaled matrix, are zeros.
+/// Pivots below this, relative to the largest one of a scaled matrix, count as zero.
 const ZERO: f64 = 1e-11;
-/// Elements of null vectors below this, relative to the largest, are zeros.
+/// Elements of null vectors below this, relative to the largest one, count as zero.
 const MIN_NULL_VECTOR_ELEMENT: f64 = 1e-6;
 
-/// How many of the sample points have a singular matrix, and how many there are; `differentiated`
-/// is whether any equation was.
+/// The number of sample points with a singular matrix, and the number of all; `differentiated`:
+/// whether any equation was differentiated.
 ///
 /// # Errors
-/// All have: names the equations that repeat each other, and the unknowns that they leave open.
+/// If all are singular: names the redundant equations, and the unknowns that they leave
+/// undetermined.
 pub fn check(analysis: &Analysis, differentiated: bool) -> Result<[u32; 2]> {
     let model = &analysis.model;
     let (nx, count) = (model.variables.x.len() as u32, model.residual.len());
@@ -66,7 +67,7 @@ pub fn check(analysis: &Analysis, differentiated: bool) -> Result<[u32; 2]> {
 }
 
 /// A vector `n` with `A n = 0`, if the matrix is singular: elimination with full pivoting after
-/// rows and columns were scaled. Without `wanted` it is empty.
+/// scaling of rows and columns. Empty without `wanted`.
 fn null_vector(mut a: Vec<Vec<f64>>, wanted: bool) -> Option<Vec<f64>> {
     let count = a.len();
     let scales = scale(&mut a);
@@ -112,7 +113,7 @@ fn null_vector(mut a: Vec<Vec<f64>>, wanted: bool) -> Option<Vec<f64>> {
     Some(vector)
 }
 
-/// Scales rows and then columns to a largest element of one; the scales of the columns.
+/// Scales rows and then columns to a largest element of one; returns the scales of the columns.
 fn scale(a: &mut [Vec<f64>]) -> Vec<f64> {
     let reciprocal = |largest: f64| if largest > 0.0 { 1.0 / largest } else { 1.0 };
     for row in a.iter_mut() {

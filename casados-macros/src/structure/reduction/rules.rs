@@ -1,4 +1,4 @@
-//! Equations that give an unknown explicitly: `q̇ = v`, or `z = h(x)`.
+//! Equations that define an unknown explicitly: `q̇ = v`, or `z = h(x)`.
 
 use super::signature::{Offsets, Row};
 use super::{times, variable_name};
@@ -7,15 +7,15 @@ use crate::language::Model;
 use std::collections::{BTreeMap, BTreeSet};
 use syn::{Error, Result};
 
-/// What takes the place of unknowns whose derivatives would be needed.
+/// Replacements of unknowns whose derivatives would be needed.
 pub struct Rules {
-    /// For a variable `ẋ_j` or `z_k` its expression, in variables that have none.
+    /// The expression for a variable `ẋ_j` or `z_k`, in variables without a rule.
     pub rates: BTreeMap<u32, Node>,
-    /// The equations that they come from.
+    /// The equations of the rules.
     pub equations: BTreeSet<usize>,
 }
 
-/// The rules of all states with more derivatives than one, and algebraic states with any.
+/// The rules of all states with more than one derivative, and of algebraic states with any.
 pub fn find(model: &mut Model, rows: &[Row], offsets: &Offsets) -> Result<Rules> {
     let nx = model.variables.x.len();
     let mut rules = Rules { rates: BTreeMap::new(), equations: BTreeSet::new() };
@@ -51,7 +51,7 @@ pub fn find(model: &mut Model, rows: &[Row], offsets: &Offsets) -> Result<Rules>
 }
 
 /// `v = −f|_{v=0} / c`, if the equation is `c v + f|_{v=0} = 0` with a `c` that depends on
-/// parameters and constants alone.
+/// parameters and constants only.
 fn explicit(model: &mut Model, row: usize, variable: u32) -> Option<Node> {
     let (equation, graph) = (model.residual[row], &mut model.graph);
     if graph.degrees(&[equation], |index| index == variable) != [Degree::Linear] {
@@ -71,7 +71,7 @@ fn explicit(model: &mut Model, row: usize, variable: u32) -> Option<Node> {
     Some(graph.binary(crate::graph::Binary::Div, rest, coefficient))
 }
 
-/// Rules in variables that have none themselves.
+/// Resolves rules to variables without a rule.
 fn resolve(model: &mut Model, rates: &mut BTreeMap<u32, Node>) -> Result<()> {
     for _ in 0..=rates.len() {
         let expressions: Vec<Node> = rates.values().copied().collect();

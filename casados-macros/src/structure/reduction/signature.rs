@@ -1,31 +1,31 @@
-//! The signature matrix of a model, and how often each equation has to be differentiated.
+//! The signature matrix of a model, and the number of differentiations of each equation.
 //!
-//! `σ_ij` is the order of the highest derivative of unknown `j` in equation `i`. With a transversal
-//! of largest sum, the offsets are the smallest `c, d ≥ 0` with
+//! `σ_ij` is the order of the highest derivative of unknown `j` in equation `i`. With a
+//! highest-value transversal, the offsets are the smallest `c, d ≥ 0` with
 //!
 //! ```text
 //! d_j − c_i ≥ σ_ij        d_j − c_i = σ_ij on the transversal
 //! ```
 //!
-//! Equation `i` differentiated `c_i` times has unknown `j` with `d_j` derivatives at most (J. D.
-//! Pryce, A simple structural analysis method for DAEs, BIT 41, 2001).
+//! Equation `i`, differentiated `c_i` times, contains at most the `d_j`-th derivative of unknown
+//! `j` (J. D. Pryce, A simple structural analysis method for DAEs, BIT 41, 2001).
 
 /// The entries `(unknown, σ)` of a row; others are −∞.
 pub type Row = Vec<(usize, u32)>;
 
-/// Offsets of equations and unknowns.
+/// The offsets of equations and unknowns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Offsets {
-    /// How often each equation is differentiated.
+    /// The number of differentiations of each equation.
     pub equations: Vec<u32>,
-    /// The highest derivative of each unknown that then occurs.
+    /// The highest resulting derivative of each unknown.
     pub unknowns: Vec<u32>,
-    /// The equation that each unknown is found from.
+    /// The equation that determines each unknown.
     pub transversal: Vec<usize>,
 }
 
-/// The offsets; `None` if no transversal exists: then the equations do not determine the unknowns,
-/// however often they are differentiated.
+/// The offsets; `None` without a transversal: then the equations do not determine the unknowns,
+/// after any number of differentiations.
 pub fn offsets(rows: &[Row]) -> Option<Offsets> {
     let transversal = transversal(rows)?;
     let mut matched = vec![(0, 0); rows.len()];
@@ -45,12 +45,12 @@ pub fn offsets(rows: &[Row]) -> Option<Offsets> {
     }
 }
 
-/// The row of each column in a transversal of largest sum, by the Hungarian method with the costs
+/// The row of each column in a highest-value transversal, by the Hungarian method with the costs
 /// `1 − σ`: potentials of rows and columns, and shortest augmenting paths.
 fn transversal(rows: &[Row]) -> Option<Vec<usize>> {
     const NONE: i64 = 1 << 40;
     let count = rows.len();
-    // The last column is where a path begins.
+    // The last column is the start of a path.
     let mut row_of = vec![usize::MAX; count + 1];
     let (mut of_rows, mut of_columns) = (vec![0i64; count], vec![0i64; count + 1]);
     for start in 0..count {
@@ -99,7 +99,7 @@ mod tests {
         text.iter().map(|row| row.to_vec()).collect()
     }
 
-    /// Two states that are explicit.
+    /// Two explicit states.
     #[test]
     fn index_one() {
         let found = offsets(&rows(&[&[(0, 1), (1, 0)], &[(1, 1), (0, 0)]]));
@@ -107,8 +107,8 @@ mod tests {
         assert_eq!(found, Some(expected));
     }
 
-    /// The pendulum `q̇ = v`, `v̇ = −λ q − g`, `q·q = 1`: the constraint twice, and what gives `q̇`
-    /// once.
+    /// The pendulum `q̇ = v`, `v̇ = −λ q − g`, `q·q = 1`: the constraint is differentiated twice,
+    /// the equation of `q̇` once.
     #[test]
     fn pendulum() {
         let found = offsets(&rows(&[
@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(offsets(&rows(&[&[(0, 0)], &[(0, 1)]])), None);
     }
 
-    /// The sum is the largest of all permutations, on patterns at random.
+    /// The sum is the largest of all permutations, for random patterns.
     #[test]
     fn transversal_has_largest_sum() {
         let mut state = 1u64;
@@ -168,7 +168,7 @@ mod tests {
         assert!(solved > 500, "{solved}");
     }
 
-    /// By trying all.
+    /// Tries all permutations.
     fn brute_force_transversal(rows: &[Row], row: usize, taken: &mut Vec<bool>) -> Option<u32> {
         let Some(entries) = rows.get(row) else { return Some(0) };
         let mut most = None;

@@ -1,4 +1,4 @@
-//! Models with linear controls and integrals: their equations, names and units, and mistakes.
+//! Models with linear controls and integrals: their equations, names and units, and errors.
 
 use super::super::{Analysis, analyse, analyse_function};
 use crate::graph::EvaluationPoint;
@@ -15,8 +15,8 @@ fn values(model: &Model, v: &[f64]) -> Vec<f64> {
     model.graph.evaluate(&model.residual, EvaluationPoint { variables: v, opaque: &[], seeds: &[] })
 }
 
-/// One of two controls is linear: its rate is in its place, and it is a state behind those of the
-/// model, before the integral.
+/// One of two controls is linear: its rate replaces it, and it is a state after those of the model,
+/// before the integral.
 #[test]
 fn states_are_behind_those_of_the_model() {
     let item = "/// - `u[1]`: N\n/// - `t`: s\nfn f(x: f64, u: [f64; 2], p: f64, t: f64) -> f64 { x * u[1] + u[0] * p + t }";
@@ -33,7 +33,7 @@ fn states_are_behind_those_of_the_model() {
     assert_eq!(explicit, Some(vec![(0, 1.0), (1, 1.0), (2, 1.0)]));
 }
 
-/// A function sees the control, its rate and the integrals where these are.
+/// A function has the control, its rate and the integrals as arguments.
 #[test]
 fn functions_have_rates_and_integrals() {
     let item = "fn f(x: f64, z: f64, u: [f64; 2], du: [f64; 2], q: f64, p: f64) -> [f64; 3] {

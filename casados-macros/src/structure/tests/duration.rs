@@ -1,4 +1,4 @@
-//! Models whose time is a multiple of a parameter: what becomes of their equations, and mistakes.
+//! Models with a duration parameter: their equations, and errors.
 
 use super::super::{Analysis, analyse};
 use crate::graph::EvaluationPoint;
@@ -18,7 +18,7 @@ fn values(analysis: &Analysis, v: &[f64]) -> Vec<f64> {
     analysis.model.graph.evaluate(&analysis.model.residual, point)
 }
 
-/// Explicit models stay explicit, with the coefficients that they had.
+/// Explicit models remain explicit, with the same coefficients.
 #[test]
 fn explicit_models_stay_explicit() {
     let item = "fn f(x: [f64; 2], u: f64, p: [f64; 2], t: f64) -> [f64; 2] { [x[1], u * t - p[0] * x[0]] }";
@@ -30,7 +30,7 @@ fn explicit_models_stay_explicit() {
     assert_eq!(found, [a - t * x1, b - t * (u * (t * tau) - p * x0)]);
 }
 
-/// Equations with rates are multiplied, others are not; rates may be anywhere in them.
+/// Equations with rates are multiplied, others are not; rates may occur anywhere.
 #[test]
 fn equations_of_rates_are_multiplied() {
     let item = "fn f(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64, t: f64) -> [f64; 3] {

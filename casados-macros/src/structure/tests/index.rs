@@ -1,4 +1,4 @@
-//! As many equations as unknowns, and a matching between them.
+//! Numbers of equations and unknowns, and their matching.
 
 use super::{accepted, model, mul, reason, refusal, sub};
 use crate::graph::{Binary, Graph, Node};
@@ -16,8 +16,7 @@ fn number_of_equations() {
     assert!(refusal(model([1, 0, 0, 0], |_, _| Vec::new())).contains("0 equations"));
 }
 
-/// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be
-/// determined from.
+/// The pendulum in Cartesian coordinates: no equation can determine the multiplier.
 #[test]
 fn index_three() {
     let pendulum = |g: &mut Graph, v: &[Node]| {
@@ -56,7 +55,7 @@ fn over_and_underdetermined() {
         vec![first, rest]
     };
     assert!(reason(model([2, 0, 0, 0], cancels)).starts_with("equations 0 and 1 determine only `xdot[0]`"));
-    // Two separate parts, each named on its own.
+    // Two separate parts, each named separately.
     let two = |g: &mut Graph, v: &[Node]| {
         vec![sub(g, v[0], v[4]), sub(g, v[0], v[5]), sub(g, v[1], v[4]), sub(g, v[1], v[5])]
     };
@@ -67,8 +66,8 @@ fn over_and_underdetermined() {
     );
 }
 
-/// The matching needs an augmenting path along all equations: equation i has ẋᵢ and ẋᵢ₋₁, the last
-/// one only the last but one.
+/// The matching requires an augmenting path through all equations: equation i has ẋᵢ and ẋᵢ₋₁, the
+/// last one only the second-to-last rate.
 #[test]
 fn long_augmenting_path() {
     let n = 300;

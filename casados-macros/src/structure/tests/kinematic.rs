@@ -1,4 +1,4 @@
-//! Which states are kinematic, and what the Newton matrix is without them.
+//! The choice of kinematic states, and the Newton matrix without them.
 
 use super::super::kinematic::Kinematic;
 use super::super::newton_matrix;
@@ -11,8 +11,8 @@ fn found(analysis: &Analysis) -> (Vec<Kinematic>, Vec<NewtonEntry>) {
     newton_matrix(model, &derivatives.jacobian, derivatives.blocks, &facts.trivial)
 }
 
-/// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial
-/// as well.
+/// `q̇` equals a state or a control, and three equations depend on `q`; the second one may be
+/// trivial as well.
 #[test]
 fn kinematic_states() {
     type Row = fn(&mut Graph, &[Node]) -> Node;
@@ -37,11 +37,11 @@ fn kinematic_states() {
         found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.dependents)).collect::<Vec<_>>()
     };
     let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
-    // Behind four entries of f_ẋ (0, 5); three equations feel q.
+    // After four entries of f_ẋ (0, 5); three equations depend on q.
     assert_eq!(kinematic(|_, v| v[5], None, sine), [(0, 4, 5, vec![5, 9, 13])]);
-    // The control, behind the entries of f_x.
+    // The control, after the entries of f_x.
     assert_eq!(kinematic(|_, v| v[8], None, sine), [(0, 16, 8, vec![4, 8, 12])]);
-    // Nobody feels q.
+    // No equation depends on q.
     assert_eq!(kinematic(|_, v| v[5], None, |_, v| v[8]), [(0, 4, 5, vec![])]);
     // The equation varies; it has a constant; a function of time.
     assert_eq!(kinematic(|_, v| v[4], None, sine), []);
@@ -50,7 +50,7 @@ fn kinematic_states() {
         sub(g, v[5], constant)
     };
     assert_eq!(kinematic(shifted, None, sine), []);
-    // So does a difference of constants from outside; a factor from outside is no constant.
+    // A difference of constants from outside is excluded, and so is a factor from outside.
     let unknown: Row = |g, v| {
         let (a, b) = (g.opaque(0), g.opaque(1));
         let difference = sub(g, a, b);
@@ -67,19 +67,19 @@ fn kinematic_states() {
         sub(g, v[5], time)
     };
     assert_eq!(kinematic(timed, None, sine), []);
-    // The others feel its derivative: behind seven entries of f_ẋ.
+    // The others depend on its derivative: after seven entries of f_ẋ.
     let with_derivative: Row = |g, v| {
         let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
     let dependents = vec![1, 3, 5, 8, 12, 16];
     assert_eq!(kinematic(|_, v| v[5], None, with_derivative), [(0, 7, 5, dependents)]);
-    // One of two that follow each other, or of a row of them.
+    // One of two successive states, or of a chain.
     for second in [(|_, v| v[4]) as Row, |_, v| v[6], |_, v| v[8]] {
         let found = kinematic(|_, v| v[5], Some(second), sine);
         assert_eq!(found.iter().map(|of| of.0).collect::<Vec<_>>(), [0]);
     }
-    // The others are the unknowns of the plan: the column of q is a part of that of its velocity.
+    // The others are the unknowns of the plan: the column of q is added to that of its velocity.
     let analysis = analysis(|_, v| v[5], None, sine);
     let ((_, positions), plan) = (found(&analysis), &analysis.elimination.plan);
     assert!(plan.pivots.len() == 3 && !plan.pivots.iter().any(|pivot| pivot.0 == 0 || pivot.1 == 0));
@@ -89,8 +89,7 @@ fn kinematic_states() {
     assert_eq!(terms, Some(vec![own, through]));
 }
 
-/// Of a row of four that follow one another, the last of them a control, every other one: as many
-/// as there can be.
+/// Of a chain of four whose last velocity is a control, every other one: the maximum set.
 #[test]
 fn velocities_are_not_kinematic() {
     let analysis = accepted(model([4, 0, 1, 0], |g, v| {
@@ -100,8 +99,7 @@ fn velocities_are_not_kinematic() {
     assert_eq!(found, [(0, 5), (2, 7)]);
 }
 
-/// Entries that feel positions are by the velocities of these: states whose velocities are in the
-/// opposite order.
+/// Entries with respect to positions are ordered by the velocities, here in the opposite order.
 #[test]
 fn dependents_are_by_velocities() {
     let analysis = accepted(model([4, 0, 0, 0], |g, v| {

@@ -1,4 +1,4 @@
-//! Models whose graphs are built by hand, and what is found out about them.
+//! Hand-built models and the results of their analysis.
 
 mod augmented_states;
 mod branches;
@@ -89,8 +89,8 @@ fn explicit_model() {
     assert_eq!(analysis.derivatives.operations.residual, 5);
 }
 
-/// What is not explicit: a derivative twice, one with a varying or an unknown coefficient, an
-/// algebraic state.
+/// Implicit models: a derivative twice, one with a varying or an unknown coefficient, an algebraic
+/// state.
 #[test]
 fn implicit_models() {
     let coefficient = |coefficient: fn(&mut Graph, &[Node]) -> Node| {
@@ -124,13 +124,13 @@ fn linear_equations() {
         vec![sub(g, v[0], with_time), sub(g, v[1], product)]
     }));
     assert_eq!(analysis.derivatives.linear, [true, false]);
-    // Time is no direction of derivatives, but the entry varies with it.
+    // Time is no direction of derivatives, but the entry depends on it.
     assert_eq!(analysis.derivatives.constant, [true, true, false, false, false]);
     assert!(analysis.derivatives.jacobian.iter().all(|entry| entry.1 < 5));
 }
 
-/// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: what varies with the state,
-/// with time, not at all.
+/// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: entries that vary with the
+/// state, with time, or not at all.
 #[test]
 fn facts() {
     let build = |square: bool, time: bool| {
@@ -166,13 +166,13 @@ fn facts() {
     assert_eq!(build(true, true), expected);
     let straight = Facts { linear_in_state: true, ..expected.clone() };
     assert_eq!(build(false, true), straight);
-    // The bilinear terms p x₀ and p x₁ are curved, but not within an interval.
+    // The bilinear terms p x₀ and p x₁ are nonlinear, but not within an interval.
     let constant = Facts { constant_matrix: true, autonomous: true, curved: vec![3, 4, 9], ..straight };
     assert_eq!(build(false, false), constant);
 }
 
-/// One variable or a function of time at the right is trivial; two variables or a varying
-/// coefficient are not.
+/// A row with one variable or a function of time at the right is trivial; with two variables or a
+/// varying coefficient it is not.
 #[test]
 fn trivial_rows() {
     let trivial = |row: fn(&mut Graph, &[Node]) -> Node| {
@@ -221,7 +221,7 @@ fn squares_of_multiples() {
 }
 
 /// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of
-/// `z₀` vanishes, which nobody can know without a word about `u`.
+/// `z₀` vanishes, which only a nominal value or a range of `u` can show.
 #[test]
 fn nominal_values_and_ranges_decide_about_pivots() {
     let pivots = |sampling: Sampling| {

@@ -1,11 +1,11 @@
-//! Models whose index is reduced: what is refused and why, and the aircraft on its tether against
-//! the form that was reduced by hand.
+//! Models with index reduction: errors with their reasons, and the aircraft on its tether against
+//! the form reduced by hand.
 
 use super::super::{Analysis, analyse};
 use crate::graph::EvaluationPoint;
 use crate::language::{self, Form};
 
-/// A model, or why there is none.
+/// A model, or its error.
 fn read(attribute: &str, item: &str) -> Result<Analysis, String> {
     let tokens = |text: &str| text.parse::<proc_macro2::TokenStream>().expect("these are tokens");
     let source =
@@ -50,7 +50,7 @@ fn a_control_that_would_jump() {
             && error.contains("make it a state, with its rate as the control"),
         "{error}"
     );
-    // In the highest derivative it may be.
+    // It may occur in the highest derivative.
     let velocity = read_reduced(
         "fn f(xdot: [f64; 2], x: [f64; 2], u: f64, z: f64) -> [f64; 3] {
             [xdot[0] - x[1] - u, xdot[1] - z, x[0] * x[0] + x[1] - 1.0]
@@ -61,7 +61,7 @@ fn a_control_that_would_jump() {
 
 #[test]
 fn constraints_that_repeat_each_other() {
-    // Different texts of the same constraint: no structure shows that.
+    // Different texts of the same constraint are structurally independent.
     let error = refusal(
         "fn f(xdot: [f64; 4], x: [f64; 4], z: [f64; 2]) -> [f64; 6] {
             [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z[0] * x[0] + z[1] * x[0], xdot[3] + z[0] * x[1] + z[1] * x[1],
@@ -77,7 +77,7 @@ fn constraints_that_repeat_each_other() {
 }
 
 /// The currents into the diodes of a ring add up to zero, though every equation has unknowns of its
-/// own: structure shows index 1, and nothing would be differentiated.
+/// own: the structural index is 1, and nothing would be differentiated.
 #[test]
 fn a_constraint_that_is_hidden_in_a_combination() {
     let diodes = |last: &str| {
@@ -107,7 +107,7 @@ fn equations_that_determine_nothing() {
 
 #[test]
 fn derivatives_that_are_not_explicit() {
-    // `q̇` from an equation that is not linear in it.
+    // `q̇` is defined by an equation that is not linear in it.
     let error = refusal(
         "fn f(xdot: [f64; 2], x: [f64; 2], z: f64) -> [f64; 3] {
             [xdot[0] + xdot[0] * xdot[0] * xdot[0] - x[1], xdot[1] - z, x[0] - 1.0]
@@ -118,7 +118,7 @@ fn derivatives_that_are_not_explicit() {
             && error.contains("no equation gives it explicitly: solve one of them for it"),
         "{error}"
     );
-    // A contact that an equation gives implicitly, and a constraint of velocities at it.
+    // A contact defined implicitly, and a constraint of velocities at it.
     let contact = |unknowns: &str, names: &str| {
         format!(
             "fn f({unknowns}) -> [f64; 4] {{
@@ -137,8 +137,8 @@ fn derivatives_that_are_not_explicit() {
     assert_eq!(reduction.differentiated, [(2, 1), (3, 1)]);
 }
 
-/// A spring whose far end is moved so that the near one follows a wave, of index 5: the equations
-/// that give derivatives are used in turn.
+/// A spring whose far end moves such that the near end follows a wave, of index 5: the equations of
+/// the derivatives are used in turn.
 #[test]
 fn a_constraint_that_is_differentiated_four_times() {
     let spring = "fn f(xdot: [f64; 4], x: [f64; 4], z: f64, t: f64) -> [f64; 5] {
@@ -147,7 +147,8 @@ fn a_constraint_that_is_differentiated_four_times() {
     }";
     let reduction = read_reduced(spring).expect("its index can be reduced").reduction.expect("it is reduced");
     assert_eq!(reduction.differentiated, [(4, 4)]);
-    // The rate of one end from an equation that is not linear in it: no rule for its derivative.
+    // The rate of one end is defined by an equation that is not linear in it: there is no rule for
+    // its derivative.
     let error = refusal(&spring.replace("xdot[2] - 7.0 * (b - a)", "xdot[2].sinh() - 7.0 * (b - a)"));
     assert!(
         error.contains("the derivative of `x[2]` must be differentiated twice")
@@ -181,8 +182,7 @@ fn rates_have_to_fit() {
     assert_eq!(analysis.reduction.map(|reduction| reduction.rates), Some(vec![2.0]));
 }
 
-/// Two constraints `sin a = sin b`, `cos a + cos b = c`: at `a = b = 0` their rows vanish,
-/// elsewhere they do not.
+/// Two constraints `sin a = sin b`, `cos a + cos b = c`: their rows vanish at `a = b = 0` only.
 #[test]
 fn rank_that_is_lost_at_some_points() {
     let item = "fn f(xdot: [f64; 4], x: [f64; 4], z: [f64; 2], p: f64) -> [f64; 6] {
@@ -199,8 +199,8 @@ fn rank_that_is_lost_at_some_points() {
     assert_eq!(singular("index_reduction, nominal(x = 0.0)")[0], singular("index_reduction")[0].max(1));
 }
 
-/// The aircraft with its tether as the constraint `c = 0`: after the reduction its equations are
-/// those of the form by hand, in value and in work.
+/// The aircraft with its tether as the constraint `c = 0`: its reduced equations equal those
+/// derived by hand, in value and in work.
 #[test]
 fn the_aircraft_from_its_constraint() {
     let text = include_str!("../../../../examples/models/awe.rs");
@@ -233,7 +233,7 @@ fn the_aircraft_from_its_constraint() {
         (26..29).for_each(|index| point[index] *= 30.0);
         for (a, b) in values(&reduced, &point).into_iter().zip(values(&by_hand, &point)) {
             // The terms of the constraint are up to 3e5 over a scale of 1.1e6, those of its
-            // derivatives less; a handful of roundings.
+            // derivatives smaller; a few rounding errors.
             assert!((a - b).abs() <= 16.0 * f64::EPSILON * (1.0 + a.abs()), "{a} {b}");
         }
     }
@@ -246,8 +246,8 @@ fn the_aircraft_from_its_constraint() {
     }
 }
 
-/// Andrews' squeezer with its six loops as constraints: where the derivatives of the velocities are
-/// the accelerations, its equations are those that were differentiated by hand.
+/// Andrews' squeezer with its six loops as constraints: where the derivatives of the velocities
+/// equal the accelerations, its equations equal those differentiated by hand.
 #[test]
 fn the_squeezer_from_its_constraints() {
     let text = include_str!("../../../../examples/models/ivp/mechanics.rs");

@@ -1,11 +1,10 @@
-//! Whether a model changes its branch inside of a step: at a stage or at its end, beside its start.
-//! Nobody knows what happens between two stages.
+//! Detection of discontinuities: compares the branches of the model at the stages and at the end of
+//! a step with those at its start. Changes between two stages are invisible.
 
 use super::*;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// How the model at a stage or at the end of the step differs from that at its start: by a
-    /// branch, or by no more than the pieces of its splines.
+    /// The strongest change of branches between the start of the step and its stages or end.
     pub(super) fn branch_change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange> {
         if const { M::BRANCHES == 0 } {
             return None;
@@ -22,8 +21,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         change
     }
 
-    /// Where the stages are beside borders: since this was asked last, and from where the branches
-    /// are those of the `jacobian`.
+    /// Whether stages have crossed a switching surface since the last call, and whether they are on
+    /// another branch than the `jacobian`.
     pub(super) fn update_surface_crossing(&mut self, jacobian: Branches) -> SurfaceCrossing {
         let mut sides = SurfaceCrossing::default();
         if const { M::BRANCHES == 0 } {

@@ -1,15 +1,16 @@
-//! What an iteration left of the residual at the last stage.
+//! The contraction rate of one iteration, measured by the residual at the last stage.
 
 use super::*;
 
-/// What one iteration may leave of the residual of any equation.
+/// Maximum ratio of the residual of any equation after and before the first iteration.
 const MAX_RESIDUAL_RATIO: f64 = 0.1;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// Whether an increment that may be so much larger than what is left after it is the last one.
+    /// Whether the error after the last increment, `rate/(1 − rate)` times the increment, is at
+    /// most `most` times the increment.
     ///
     /// # Errors
-    /// [`Failure::NotFinite`]
+    /// [`NewtonFailure::NotFinite`]
     pub(super) fn confirm_convergence(
         &mut self,
         most: f64,
@@ -17,7 +18,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         residuals: &mut usize,
     ) -> Result<bool, NewtonFailure> {
         let rate = self.residual_ratio(residuals)?;
-        // An increment far below the tolerance may be the whole of a state that is below it, too.
+        // An increment far below the tolerance may be the whole value of a state far below `atol`.
         let most = if convergence.iterations == 1 { most.min(MAX_RESIDUAL_RATIO) } else { most };
         let confirmed = rate <= most * (1.0 - rate);
         if confirmed {
@@ -26,13 +27,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         Ok(confirmed)
     }
 
-    /// The residual at the last stage relative to the one before the iteration at all stages, of
-    /// the worst equation: the rate of convergence, where a force or its derivatives jump in the
-    /// step, or where it is longer than those before. The rate of an earlier step knows nothing of
-    /// that.
+    /// The ratio of the residual at the last stage after the iteration and the largest residual at
+    /// all stages before it, for the equation in which it is largest. It is the contraction rate
+    /// across a discontinuity and in steps longer than those before, for which the rate of an
+    /// earlier step does not hold.
     ///
     /// # Errors
-    /// [`Failure::NotFinite`]
+    /// [`NewtonFailure::NotFinite`]
     fn residual_ratio(&mut self, residuals: &mut usize) -> Result<f64, NewtonFailure> {
         let StageMemory { stage_points: points, defect_point: point, .. } = &mut *self.memory;
         copy_last_stage(points, point.as_mut());
@@ -42,13 +43,14 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     }
 }
 
-/// `|after| / |before|` of the worst equation, of the largest before in all lanes.
+/// The largest ratio `|after| / |before|` of all equations, with the maximum of `before` over all
+/// lanes.
 fn largest_ratio<T: Real>(after: &[T], before: &[&[[T; STAGES_PER_GROUP]]]) -> f64 {
     let mut ratio = 0.0f64;
     for (equation, after) in after.iter().enumerate() {
         let all = before.iter().flat_map(|group| group.get(equation)).flatten();
         let most = all.fold(0.0f64, |most, f| most.max(f.abs().to_f64()));
-        // Written so that nothing of nothing is nothing.
+        // `0/0` counts as zero.
         ratio = ratio.max(after.abs().to_f64() / most);
     }
     ratio

@@ -1,15 +1,15 @@
-//! The estimated error of a step.
+//! The error estimates of a step.
 
 use super::*;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// The larger one of the two estimates, from the defect at the point that is there.
+    /// The larger of the two error estimates, from the defect at the current point.
     ///
-    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where
-    /// nothing is a stage it is how far the extrapolated derivative is from the solution at the
-    /// state that was reached: of stiff components this is their error, which no method with
-    /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
-    /// the estimate. The second, of the states, is that of [`DefectFilter`].
+    /// The first is the defect, solved with the matrix of one eigenvalue. At the end of a step
+    /// without a stage there, the defect is the difference of the extrapolated derivative and that
+    /// of the solution: for stiff components this is their error, which methods with `|R(∞)| = 1`
+    /// do not damp. The extrapolated `z` is discarded, and the solve removes it from the estimate.
+    /// The second estimate, of the states, is that of [`DefectFilter`].
     pub(super) fn estimate_from_point(
         &mut self,
         start: &StepContext<'_, M, T>,
@@ -24,9 +24,9 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         if at_end || !start.derivatives_are_known || larger <= first.max(SAFE_ESTIMATE) {
             return Ok(larger);
         }
-        // Newton's method leaves a residual of algebraic equations at the start, which does not
-        // shrink with the step: not of this step, and without it only the second estimate is below
-        // its tolerance.
+        // Newton's method leaves a residual of algebraic equations at the start, which is no error
+        // of this step and does not shrink with it. Without it the second estimate may meet its
+        // tolerance.
         let mut defect = self.memory.defect_residual;
         self.memory.defect_point = *start.start_point;
         self.evaluate_point_residual(residuals)?;
@@ -37,7 +37,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         Ok(self.second_estimate(first, start))
     }
 
-    /// The larger one of an estimate and the second one, of the defect that was filtered last.
+    /// The larger of the estimate `first` and the second estimate, of the last filtered defect.
     fn second_estimate(&self, first: f64, start: &StepContext<'_, M, T>) -> f64 {
         let [error, divided] = self.filtered_defect(start.h);
         let mut relative = RelativeErrors::default();
@@ -51,12 +51,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         self.scheme.defect_filter.max_estimate(first, start.tolerance_ratio, &relative)
     }
 
-    /// The larger one of an estimate at the end of a step and the same at its start: of what ends
-    /// between the start and the first stage, as a force that jumps there, neither the stages nor
-    /// the end know. What the polynomial has for `ẋ` at the start tells at no cost where that is
-    /// nothing new: no filter makes more of what is neither stiff nor turns, and where the estimate
-    /// is held against the tolerance that was asked for it counts `tolerance_ratio /
-    /// ORDER_REDUCTION_RATIO` times at most.
+    /// The larger of the estimate at the end of a step and the same estimate at its start: a
+    /// discontinuity before the first stage is invisible to the stages and the end.
+    ///
+    /// The start is evaluated only if the difference of the polynomial's `ẋ` and the solution's
+    /// there is large: for components that are neither stiff nor oscillating the filter does not
+    /// amplify it, and relative to the user's tolerance it counts at most
+    /// `tolerance_ratio / ORDER_REDUCTION_RATIO` times.
     pub(super) fn max_with_start_estimate(
         &mut self,
         start: &StepContext<'_, M, T>,
@@ -75,8 +76,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         }
         let unfiltered = self.scheme.basis.eigenvalues().scaled(start.h).get(0).0.to_f64().abs()
             * norm(&changes.as_ref()[..nx], start.estimator_scale.as_ref());
-        let undoubted = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
-        if unfiltered <= 2.0 * error.max(undoubted) {
+        let safe_estimate = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
+        if unfiltered <= 2.0 * error.max(safe_estimate) {
             return Ok(error);
         }
         let at_end = self.memory.error_estimate;
@@ -84,11 +85,11 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let first = norm(&self.memory.error_estimate.as_ref()[..nx], start.estimator_scale.as_ref());
         self.memory.error_estimate = at_end;
         let at_start = self.second_estimate(first, start);
-        // Written so that NaN stays.
+        // NaN is returned.
         Ok(if at_start <= error { error } else { at_start })
     }
 
-    /// The residual at the point that is there.
+    /// Evaluates the residual at the current point.
     pub(super) fn evaluate_point_residual(&mut self, residuals: &mut usize) -> Result<(), NewtonFailure> {
         let StageMemory { defect_point: point, defect_residual: f_point, .. } = &mut *self.memory;
         *residuals += 1;
@@ -96,7 +97,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         if find_non_finite(f_point.as_ref()).is_some() { Err(NewtonFailure::NotFinite) } else { Ok(()) }
     }
 
-    /// The estimated error of `(x, z)` from the defect at the point that is there.
+    /// Estimates the error of `(x, z)` from the defect at the current point.
     fn estimate_from_defect(&mut self, h: T, residuals: &mut usize) -> Result<(), NewtonFailure> {
         self.evaluate_point_residual(residuals)?;
         let mut error = self.memory.defect_residual;

@@ -1,16 +1,16 @@
-//! The defect of a step in which the model changes its branch.
+//! The defect at further points of a step in which the model changes its branch.
 //!
-//! The polynomial `u` of a step leaves the defect `d(τ) = u̇ − f(u)`, which is zero at the nodes.
-//! The error at the end of a smooth step is the integral of the defect, in which all but high terms
-//! cancel: so it is of order `2s − 1` or `2s`, and the estimate, of order `s`, may be a thousand
-//! tolerances. Where a force jumps inside the step, or one of its derivatives, nothing cancels, and
-//! the estimate may be close to the error, or below it: further points of the defect tell.
+//! The polynomial `u` of a step has the defect `d(τ) = u̇ − f(u)`, which is zero at the nodes. The
+//! error at the end of a smooth step is the integral of the defect, in which all but the high-order
+//! terms cancel: it has order `2s − 1` or `2s`, and the estimate, of order `s`, may be a thousand
+//! tolerances. If a force or one of its derivatives jumps within the step, nothing cancels, and the
+//! estimate may be close to the error or below it. The defect at further points shows this.
 
 use super::*;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// The larger one of the filtered defects between the last two nodes and in the middle,
-    /// relative to what the estimate tolerates.
+    /// The larger of the filtered defects between the last two nodes and in the middle, relative to
+    /// the estimator tolerance.
     pub(super) fn largest_defect(
         &mut self,
         start: &StepContext<'_, M, T>,

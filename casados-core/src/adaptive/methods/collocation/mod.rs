@@ -1,11 +1,11 @@
-//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton, the estimate of its
-//! error, and its polynomial.
+//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton iterations, the error
+//! estimate, and the collocation polynomial.
 //!
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for
-//! `f(ẋ, x, z, t) = 0` with unknowns `k_i`, `z_i` instead of increments of `y`.
+//! `f(ẋ, x, z, t) = 0`, with unknowns `k_i`, `z_i` instead of increments of `y`.
 //!
-//! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of
-//! the last repeats the last stage.
+//! Stages are stored in `G` groups of four, the lanes of common registers; surplus lanes repeat the
+//! last stage.
 
 mod branches;
 mod contraction_rate;
@@ -41,7 +41,7 @@ use core::marker::PhantomData;
 use scheme::Scheme;
 use stage_evaluation::{copy_lane, copy_last_stage, evaluate_polynomial, weighted_stage_sums};
 
-/// An estimate that is smaller lets the next step grow, whatever it is of.
+/// An error estimate below this lets the next step grow; larger ones are examined further.
 const SAFE_ESTIMATE: f64 = 0.25;
 
 /// Memory of a step.
@@ -50,14 +50,14 @@ const SAFE_ESTIMATE: f64 = 0.25;
 struct StageMemory<M: Dae, T: Plain, const S: usize, const G: usize> {
     /// The unknowns `(k, z)` at the stages.
     stage_unknowns: ArrayK<M, StageGroups<T, G>>,
-    /// Those of the last accepted step.
+    /// The unknowns of the last accepted step.
     accepted_unknowns: ArrayK<M, [T; S]>,
     /// Variables of the model at the stages.
     stage_points: [ArrayV<M, [T; STAGES_PER_GROUP]>; G],
     /// The residual at the stages.
     stage_residuals: [ArrayK<M, [T; STAGES_PER_GROUP]>; G],
     right_hand_sides: EigenRows<M, T>,
-    /// Variables at one point, and the residual there.
+    /// The variables at one point, and the residual there.
     defect_point: ArrayV<M, T>,
     defect_residual: ArrayK<M, T>,
     /// The estimated error of `(x, z)`.
@@ -77,7 +77,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new(tableau: Tableau<S>) -> Result<Self, Error> {
-        // Gauss and Radau IIA methods have one: tests construct all.
+        // Gauss and Radau IIA methods have a scheme: tests construct all.
         let scheme = Scheme::new(tableau).ok_or(Error::OutOfMemory { bytes: 0 })?;
         Ok(Self { scheme, memory: allocate()? })
     }
@@ -117,7 +117,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
         {
             let unit = if unknown < nx { start.h.abs() * *scale } else { *scale };
             let increment = row.parts.iter().fold(0.0f64, |most, part| most.max(part.abs().to_f64()));
-            // Written so that the first one that is not finite counts.
+            // The first non-finite increment becomes the largest one.
             let increment = increment * unit.to_f64();
             if increment > largest || increment.is_nan() && largest < f64::INFINITY {
                 largest = if increment.is_nan() { f64::INFINITY } else { increment };
@@ -212,7 +212,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
             let increment = root_mean_square(self.apply_increment(start, true), M::Shape::NK * S);
             convergence.iterations = iteration;
             if !increment.is_finite() {
-                // A value of the model that is not finite leaves no increment that is.
+                // A non-finite value of the model makes the increment non-finite.
                 let finite = self
                     .memory
                     .stage_residuals
@@ -256,13 +256,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
 
     fn filter_residual(&mut self, h: T, residual: &mut ArrayK<M, T>) {
         let StageMemory { right_hand_sides: rows, factors, .. } = &mut *self.memory;
-        // The same in the systems of all eigenvalues.
+        // The same right-hand side for the systems of all eigenvalues.
         for (equation, f) in residual.as_ref().iter().enumerate() {
             rows[slot::<M>(equation)] = [[Complex::real(-*f)]];
         }
         factors.solve(rows);
-        // The real one is the first. Of methods with an even number of stages there is none; the
-        // error is the real part.
+        // The real eigenvalue is the first. Methods with an even number of stages have none; their
+        // estimate is the real part.
         let (re, im) = self.scheme.basis.eigenvalues().scaled(h).get(0);
         for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
             let (real, imaginary) = row.get(0);
@@ -300,8 +300,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
         let mut point = ArrayV::<M, T>::zeroed();
         let at_end = self.estimate_point(start, &mut point);
         self.memory.defect_point = point;
-        // What the method misses is how far the derivative of its polynomial, extrapolated to the
-        // start of the step, is from the solution there.
+        // The defect: the difference of the derivative of the polynomial, extrapolated to the start
+        // or end of the step, and the derivative of the solution.
         let error = self.estimate_from_point(start, at_end, residuals)?;
         if at_end && error < 1.0 {
             return self.max_with_start_estimate(start, error, residuals);
@@ -314,7 +314,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
         for (state, error) in states.iter_mut().zip(self.memory.error_estimate.as_ref()) {
             *state = *state + *error;
         }
-        // What the model is on the other side of a border says nothing of this one.
+        // The model beyond a switching surface gives no estimate on this side.
         let branches = Branches::at_point::<M, T>(start.start_point);
         if branches.change_to(Branches::at_point::<M, T>(&self.memory.defect_point))
             == Some(BranchChange::Switch)
@@ -348,7 +348,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Coll
             self.evaluate_end(h, point);
             return false;
         }
-        // It is the end of the step.
+        // The last stage is at the end of the step.
         copy_last_stage(&self.memory.stage_points, point.as_mut());
         true
     }

@@ -1,28 +1,28 @@
-//! What a collocation method is without a model.
+//! The coefficients of a collocation method, independent of the model.
 
 use super::*;
 
-/// The coefficients of a method with `S` stages in `G` groups: compiled once for all models.
+/// The coefficients of a method with `S` stages in `G` groups; compiled once for all models.
 pub(super) struct Scheme<T: Real, const S: usize, const G: usize> {
     pub(super) tableau: Tableau<S>,
     pub(super) stiffly_accurate: bool,
-    /// Columns of `A`, and of `−h A` of this step.
+    /// The columns of `A`, and those of `−h A` for the current step.
     a: [StageGroups<T, G>; S],
     pub(super) minus_ha: [StageGroups<T, G>; S],
     pub(super) c: StageGroups<T, G>,
-    /// Columns of the basis, one for each part.
+    /// The right eigenvectors of `A`, one column for each real or imaginary part.
     pub(super) right_eigenvectors: [StageGroups<T, G>; COMPLEX_PARTS],
-    /// Lagrange polynomials at the start of the step.
+    /// The Lagrange polynomials at the start of the step.
     pub(super) lagrange_at_start: [T; S],
-    /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
+    /// The denominators of the Lagrange polynomials: `1 / Π_{j≠i} (c_i − c_j)`.
     lagrange_factors: [f64; S],
     pub(super) basis: Eigenbasis<T, S, COMPLEX_PARTS>,
     pub(super) defect_filter: DefectFilter,
 }
 
 impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
-    /// Nothing for a method whose stages cannot be told apart: Gauss and Radau IIA methods are
-    /// none. Not inlined: callers would have each of its numbers by itself.
+    /// Returns nothing if stages coincide, which Gauss and Radau IIA methods exclude. Not inlined:
+    /// callers would repeat each coefficient.
     #[inline(never)]
     pub(super) fn new(tableau: Tableau<S>) -> Option<Self> {
         const { assert!(G == S.div_ceil(STAGES_PER_GROUP), "as many groups as hold the stages") };
@@ -54,7 +54,7 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
         Some(scheme)
     }
 
-    /// The Lagrange polynomials of the nodes, without a division.
+    /// The Lagrange polynomials of the nodes at `theta`, without a division.
     pub(super) fn lagrange_polynomials(&self, theta: f64) -> [f64; S] {
         let c = self.tableau.c();
         let (mut before, mut after) = (1.0, 1.0);
@@ -70,41 +70,41 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
         values
     }
 
-    /// The same as numbers.
+    /// The Lagrange polynomials at `theta` as numbers of the integrator.
     pub(super) fn lagrange_values(&self, theta: f64) -> [T; S] {
         self.lagrange_polynomials(theta).map(T::from_f64)
     }
 
-    /// Their integrals from zero on.
+    /// The integrals of the Lagrange polynomials from zero to `theta`.
     pub(super) fn lagrange_integrals(&self, theta: f64) -> [T; S] {
         self.tableau.weights(theta).map(T::from_f64)
     }
 
-    /// `b`
+    /// The quadrature weights `b`.
     pub(super) fn quadrature_weights(&self) -> [T; S] {
         self.tableau.b().map(T::from_f64)
     }
 
-    /// The point in the middle between a stage and the one before.
+    /// The midpoint between the nodes of a stage and of the one before it.
     pub(super) fn midpoint_node(&self, stage: usize) -> f64 {
         0.5 * (self.tableau.c()[stage - 1] + self.tableau.c()[stage])
     }
 
-    /// The Lagrange polynomials at the nodes of a step that follows on this one, `ratio` times as
-    /// long: a column for each node of this one.
+    /// The Lagrange polynomials at the nodes of the next step, `ratio` times as long: one column
+    /// for each node of this step.
     pub(super) fn extrapolation_weights(&self, ratio: f64) -> [StageGroups<T, G>; S] {
         let weights: [[f64; S]; S] =
             from_fn(|i| self.lagrange_polynomials(1.0 + self.tableau.c()[i] * ratio));
         from_fn(|j| Self::stage_groups(|i| T::from_f64(weights[i][j])))
     }
 
-    /// `−h A` of a step of length `h`.
+    /// Sets `−h A` for a step of length `h`.
     pub(super) fn set_step_size(&mut self, h: T) {
         let a = self.a.as_flattened().as_flattened();
         scale_by_minus_h(h, a, self.minus_ha.as_flattened_mut().as_flattened_mut());
     }
 
-    /// Times of the stages.
+    /// The times of the stages.
     pub(super) fn stage_times(&self, t: T, h: T) -> StageGroups<T, G> {
         let mut times = self.c;
         for time in times.as_flattened_mut() {
@@ -113,18 +113,18 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
         times
     }
 
-    /// A value of each stage, of which the last is repeated.
+    /// Groups of the values of the stages; the last value is repeated.
     fn stage_groups(value: impl Fn(usize) -> T) -> StageGroups<T, G> {
         from_fn(|group| from_fn(|lane| value((STAGES_PER_GROUP * group + lane).min(S.saturating_sub(1)))))
     }
 
-    /// The sum over the stages, each once.
+    /// The sum over the stages, each counted once.
     pub(super) fn sum_over_stages(sum: &StageGroups<T, G>) -> f64 {
         sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
     }
 }
 
-/// A value of each stage, of which the last is repeated.
+/// Copies the values of the stages into groups; the last value is repeated.
 #[inline(never)]
 fn pad_stages<T: Real>(from: &[T], to: &mut [[T; STAGES_PER_GROUP]]) {
     for (lane, to) in to.as_flattened_mut().iter_mut().enumerate() {
@@ -132,7 +132,7 @@ fn pad_stages<T: Real>(from: &[T], to: &mut [[T; STAGES_PER_GROUP]]) {
     }
 }
 
-/// `−h A`
+/// Computes `−h A`.
 #[inline(always)]
 fn scale_by_minus_h<T: Real>(h: T, a: &[T], to: &mut [T]) {
     for (to, a) in to.iter_mut().zip(a) {
@@ -140,7 +140,7 @@ fn scale_by_minus_h<T: Real>(h: T, a: &[T], to: &mut [T]) {
     }
 }
 
-/// `1 / Π_{j≠i} (c_i − c_j)`
+/// Computes `1 / Π_{j≠i} (c_i − c_j)`.
 #[inline(never)]
 fn set_lagrange_factors(nodes: &[f64], to: &mut [f64]) {
     for (i, (own, to)) in nodes.iter().zip(to).enumerate() {

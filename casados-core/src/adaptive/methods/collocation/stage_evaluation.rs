@@ -1,9 +1,9 @@
-//! The stages as points of the model, and the polynomial through them.
+//! Evaluation of the model at the stages, and of the collocation polynomial.
 
 use super::*;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
-    /// The residual at all stages, and from there to the rows of the linear systems.
+    /// Evaluates the residual at all stages and writes the right-hand sides of the linear systems.
     pub(super) fn evaluate_stages(&mut self) {
         let StageMemory {
             stage_points: points,
@@ -33,8 +33,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         });
     }
 
-    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of
-    /// the squares of the changes of `(ξ, z)` relative to what is tolerated.
+    /// Applies the increment, `y ← y − Δ`, if there is one, and updates the variables at the
+    /// stages. Returns the sum of squares of the changes of `(ξ, z)` relative to the tolerances.
     pub(super) fn apply_increment(&mut self, start: &StepContext<'_, M, T>, increment: bool) -> f64 {
         let StageMemory { stage_unknowns: y, stage_points: points, right_hand_sides: rows, .. } =
             &mut *self.memory;
@@ -42,7 +42,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let (re, im) = self.scheme.right_eigenvectors.split_at(COMPLEX_PARTS / 2);
         let sum = dispatch(ApplyIncrement {
             minus_ha: &self.scheme.minus_ha,
-            // Of the lanes that there are eigenvalues for.
+            // The lanes that belong to eigenvalues.
             right_eigenvectors: [&re[..S.div_ceil(2)], &im[..S.div_ceil(2)]],
             x: &start.start_point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
             scale: start.estimator_scale.as_ref(),
@@ -53,15 +53,15 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         Scheme::<T, S, G>::sum_over_stages(&sum)
     }
 
-    /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
+    /// Evaluates `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
     pub(super) fn evaluate_end(&self, h: T, point: &mut ArrayV<M, T>) {
         let (end, b) = (self.scheme.lagrange_values(1.0), self.scheme.quadrature_weights());
         evaluate_polynomial::<M, T, S, G>(&self.memory.stage_unknowns, [&end, &b], h, point);
     }
 }
 
-/// From `x_n` to a point of the step: `x_n + h Σ_i b_i k_i` with the `integrals` of the Lagrange
-/// polynomials there, and `ẋ` and `z` with their `values`.
+/// Moves a point from `x_n` to a point of the step: `x_n + h Σ_i b_i k_i` with the `integrals` of
+/// the Lagrange polynomials there, and `ẋ` and `z` with their `values`.
 pub(super) fn evaluate_polynomial<M: Dae, T: Real, const S: usize, const G: usize>(
     y: &ArrayK<M, StageGroups<T, G>>,
     [values, integrals]: [&[T; S]; 2],
@@ -79,7 +79,7 @@ pub(super) fn evaluate_polynomial<M: Dae, T: Real, const S: usize, const G: usiz
     axpy(h, change.as_ref(), x);
 }
 
-/// `Σ_i weight_i y_i` of some unknowns.
+/// `Σ_i weight_i y_i` for several unknowns.
 #[inline(always)]
 pub(super) fn weighted_stage_sums<T: Real, const S: usize, const G: usize>(
     weights: &[T; S],
@@ -115,7 +115,7 @@ fn looped_stage_sums<T: Real, const S: usize, const G: usize>(
     unrolled_stage_sums(weights, y, to);
 }
 
-/// Values in one lane of a group: a loop of its own, which is not unrolled.
+/// Copies one lane of a group; a separate loop, which is not unrolled.
 #[inline(never)]
 pub(super) fn copy_lane<T: Real>(group: &[[T; STAGES_PER_GROUP]], lane: usize, to: &mut [T]) {
     for (to, from) in to.iter_mut().zip(group) {
@@ -123,7 +123,7 @@ pub(super) fn copy_lane<T: Real>(group: &[[T; STAGES_PER_GROUP]], lane: usize, t
     }
 }
 
-/// Variables at the last stage, which the last lane of the last group repeats.
+/// Copies the variables at the last stage, which the last lane of the last group repeats.
 pub(super) fn copy_last_stage<V: AsRef<[[T; STAGES_PER_GROUP]]>, T: Real>(groups: &[V], to: &mut [T]) {
     copy_lane(groups.last().map_or(&[], AsRef::as_ref), STAGES_PER_GROUP - 1, to);
 }

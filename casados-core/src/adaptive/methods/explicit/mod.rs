@@ -1,5 +1,5 @@
-//! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
-//! the difference to the other one decides about the step.
+//! Explicit pairs for non-stiff models: the method of higher order advances the solution; the
+//! difference of the two methods controls the step size.
 
 mod rounding;
 mod stepper;
@@ -7,7 +7,7 @@ mod stepper;
 use crate::adaptive::engine::{Engine, MethodState};
 use crate::adaptive::pairs::EmbeddedPair;
 use crate::adaptive::point::ModelPoint;
-use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::replay::{StepDifferentiator, StepRecord};
 use crate::adaptive::step::{AcceptedStepOutput, AfterStep, Run, Span, Workspace};
 use crate::adaptive::step_size::{ExplicitStep, PiController, first_step_size};
 use crate::adaptive::tape::TapeEntry;
@@ -29,14 +29,14 @@ use core::any::Any;
 use core::marker::PhantomData;
 use stepper::{ExplicitStepper, PairStepper};
 
-/// Where rounding errors limit the steps, their number is inversely proportional to the tolerance:
-/// tolerances that need `max_steps`, times this, need half as many.
+/// Safety factor of the proposed tolerance if rounding errors limit the steps: the number of steps
+/// is then inversely proportional to the tolerance, and the proposal needs half of `max_steps`.
 const TOLERANCE_MARGIN: f64 = 2.0;
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
     stepper: Option<Box<dyn ExplicitStepper<M, T> + Send + Sync>>,
-    /// The integrator with steps of equal size, which exists for explicit models alone.
+    /// The fixed-step integrator, which exists for explicit models only.
     fixed_step_integrator: Option<Box<dyn Any + Send + Sync>>,
     method: PhantomData<fn() -> B>,
 }
@@ -53,7 +53,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
             let erk: Box<Erk<M, B, S, T, Heap>> = Box::new(Erk::new(Options::default())?);
             self.fixed_step_integrator = Some(erk);
         }
-        // It is one, whatever the type system knows.
+        // The model is explicit here, which the type system cannot express.
         let erk = self
             .fixed_step_integrator
             .as_mut()
@@ -61,8 +61,8 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
         erk.ok_or(Error::NoResult)
     }
 
-    /// At the start of a step.
-    fn prepare_replay(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+    /// Prepares the fixed-step integrator at the start of a step.
+    fn prepare_replay(&mut self, step: &StepRecord<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
         let erk = self.fixed_step_erk()?;
         if M::Shape::NP > 0 {
             erk.set_parameters(step.start.p)?;
@@ -75,7 +75,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
 impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.prepare_replay(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -83,7 +83,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn forward(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.prepare_replay(step)?.forward_with_quadrature(step.start.x, step.start.u, step.h, integrand)
@@ -91,7 +91,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn hessian(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -106,7 +106,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, 
 
     fn adjoint(
         &mut self,
-        step: &AcceptedStep<'_, M, T>,
+        step: &StepRecord<'_, M, T>,
         lambda: &VectorX<M, T>,
         integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -161,7 +161,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
     }
 }
 
-/// The steps of an interval; the state at its end.
+/// Takes the steps of an interval; returns the state at its end.
 fn integrate_steps<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
@@ -247,15 +247,17 @@ fn integrate_steps<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     }
 }
 
-/// The error of a run whose steps do not suffice, with so many left at the present length.
+/// The error of a run that exceeds its number of steps, with the length `left` in units of the
+/// present step.
 fn too_many_steps<M: Dae, T: Real>(step: &dyn ExplicitStepper<M, T>, t: T, steps: usize, left: T) -> Error {
     let needed = 1.0 + left.to_f64() / steps as f64;
     let rounding = step.is_limited_by_rounding().then_some(TOLERANCE_MARGIN * needed);
     Error::TooManySteps { t: t.to_f64(), steps, stiff: rounding.is_none() && step.is_stiff(), rounding }
 }
 
-/// Takes a step from `x`: its error relative to what is tolerated, which counts so often at most,
-/// and that of derivatives if they take part; NaN if there is none.
+/// Attempts a step from `x`: the estimated errors of the states and, if they are controlled, of the
+/// sensitivities, relative to the tolerance. `most` limits the global error factor. NaN if there is
+/// no estimate.
 fn attempt_step<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
@@ -273,7 +275,7 @@ fn attempt_step<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
         Some(sensitivities) if error <= 1.0 => {
             let Workspace { point, u, parameters, tolerances: Tolerances { rtol, atol, .. }, .. } =
                 &*run.workspace;
-            let taken = AcceptedStep {
+            let taken = StepRecord {
                 start: ModelPoint { x, u, p: parameters, t },
                 h,
                 stage_unknowns: &[],
@@ -289,7 +291,7 @@ fn attempt_step<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     }
 }
 
-/// The length of the first step.
+/// The size of the first step.
 fn initial_step_size<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
@@ -368,7 +370,7 @@ macro_rules! explicit {
                 step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
             }
 
-            fn replays(state: &mut Self::State) -> &mut Self::Differentiator {
+            fn differentiator(state: &mut Self::State) -> &mut Self::Differentiator {
                 state
             }
         })*

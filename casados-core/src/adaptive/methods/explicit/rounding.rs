@@ -1,32 +1,33 @@
-//! Rounding errors in the estimate of an explicit pair.
+//! Rounding errors in the error estimate of an explicit pair.
 //!
-//! The model multiplies what is rounded off of a stage by its Jacobian. With the coefficients `e`
-//! of the difference of both methods and random signs `s_i` the rounding error of that difference
+//! The Jacobian of the model amplifies the rounding errors of the stages. With the coefficients `e`
+//! of the difference of both methods and random signs `s_i`, the rounding error of that difference
 //! is about
 //!
 //! ```text
 //! h ‖e‖₂ ‖f(x_i (1 + 2 ε s_i)) − f(x)‖
 //! ```
 //!
-//! Rounding errors of steps are independent: their sum over `n` steps is `√n` times one of them.
-//! So they count once, and the rest of the estimate by the global error factor.
+//! Rounding errors of different steps are independent: their sum over `n` steps is `√n` times a
+//! single one. They therefore count once, and the rest of the estimate is multiplied by the global
+//! error factor.
 
 use crate::scalar::Scalar;
 
 /// Attempted steps between two measurements of the rounding error.
 const ATTEMPTS_PER_MEASUREMENT: usize = 20;
-/// Errors above this part of the tolerance limit the step size.
+/// Attempts with an error estimate above this part of the tolerance limit the step size.
 const LIMITING_ERROR: f64 = 0.1;
 
-/// The rounding errors of a run.
+/// Statistics of the rounding errors of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RoundingErrors {
-    /// The state of a shift register.
+    /// The state of a shift register (random numbers).
     generator_state: u64,
     /// The mean square of the rounding errors of steps of length one, relative to the tolerance.
     mean_square: Option<f64>,
     attempts: usize,
-    /// Steps limited by rounding errors less those that are not.
+    /// The number of attempts limited by rounding errors, minus the number of others.
     limited_minus_unlimited: i64,
 }
 
@@ -42,14 +43,14 @@ impl Default for RoundingErrors {
 }
 
 impl RoundingErrors {
-    /// Whether they are to be measured before this attempt.
+    /// Whether a measurement is due before this attempt.
     pub fn is_measurement_due(&mut self) -> bool {
         let due = self.attempts.is_multiple_of(ATTEMPTS_PER_MEASUREMENT);
         self.attempts += 1;
         due
     }
 
-    /// 1 or −1 (G. Marsaglia, Xorshift RNGs, J. Stat. Softw. 8 (2003)).
+    /// A random sign, 1 or −1 (G. Marsaglia, Xorshift RNGs, J. Stat. Softw. 8 (2003)).
     pub fn random_sign(&mut self) -> f64 {
         self.generator_state ^= self.generator_state << 13;
         self.generator_state ^= self.generator_state >> 7;
@@ -57,7 +58,7 @@ impl RoundingErrors {
         if self.generator_state >> 63 == 0 { 1.0 } else { -1.0 }
     }
 
-    /// Takes a measured rounding error of a step of length `h` into the mean.
+    /// Includes the measured rounding error of a step of length `h` in the mean.
     pub fn record_measurement(&mut self, error: f64, h: f64) {
         let square = (error / h) * (error / h);
         if square.is_finite() {
@@ -69,11 +70,11 @@ impl RoundingErrors {
     /// `√(d² − rounding²)`, since variances add up.
     pub fn truncation_error(&self, difference: f64, h: f64) -> f64 {
         let square = difference * difference - self.mean_square.unwrap_or(0.0) * h * h;
-        // Written so that NaN stays.
+        // NaN is returned.
         if square < 0.0 { 0.0 } else { Scalar::sqrt(square) }
     }
 
-    /// Counts an attempt with this error estimate, of which so much is truncation error.
+    /// Counts an attempt with this error estimate and its truncation error.
     pub fn count_attempt(&mut self, estimate: f64, truncation: f64) {
         let limits = estimate > LIMITING_ERROR && truncation < estimate;
         self.limited_minus_unlimited += if limits { 1 } else { -1 };

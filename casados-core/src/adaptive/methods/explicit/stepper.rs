@@ -1,4 +1,4 @@
-//! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
+//! One step of an explicit pair: its stages, error estimate, and dense output.
 
 use super::rounding::RoundingErrors;
 use crate::adaptive::discontinuity::{BranchChange, Branches};
@@ -22,68 +22,68 @@ use core::marker::PhantomData;
 struct StepMemory<M: Ode, T: Real, const S: usize> {
     point: StagePoint<M, T>,
     stage_record: StepRecord<M, T, S>,
-    /// The state at the end of the step, and its derivative there.
+    /// The state and its derivative at the end of the step.
     end_state: ArrayX<M, T>,
     end_derivative: ArrayX<M, T>,
     difference: ArrayX<M, T>,
     scale: ArrayX<M, T>,
-    /// Stages for dense output.
+    /// The stages for dense output.
     dense_stages: [ArrayX<M, T>; 3],
-    /// The branches of the model at the start of the step, and at its end.
+    /// The branches of the model at the start and at the end of the step.
     end_branches: [Branches; 2],
 }
 
 /// A step of an explicit pair.
 pub trait ExplicitStepper<M: Dae, T: Real> {
-    /// Goes to the start of a step.
+    /// Sets the inputs and the state at the start of a step.
     fn go(&mut self, inputs: &[T], x: &[T]);
     /// The derivative at the start.
     ///
     /// # Errors
     /// A value that is not finite.
     fn slope(&mut self, t: T) -> Result<&[T], Error>;
-    /// All stages of a step whose first is there, and its end.
+    /// Computes the stages after the first one, and the state at the end.
     ///
     /// # Errors
     /// A value that is not finite.
     fn take(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The derivative at the end.
+    /// Computes the derivative at the end.
     ///
     /// # Errors
     /// A value that is not finite.
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated, that counts so often at most; the
-    /// derivative at the end is there if that is at most one.
+    /// The estimated error relative to the tolerance, with a global error factor of at most `most`.
+    /// If it is at most one, the derivative at the end has been computed.
     ///
     /// # Errors
     /// A value that is not finite.
     fn estimate_error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
-    /// How the step that was taken changes the branches of the model, if it does.
+    /// The change of branches over the last attempted step, if any.
     fn branch_change(&self) -> Option<BranchChange>;
     /// The state at the end.
     fn end_state(&self) -> &[T];
-    /// The end is the next start.
+    /// Makes the end of the step the next start.
     fn move_to_end(&mut self);
-    /// The polynomial of the step that was taken.
+    /// Dense output of the last step.
     ///
     /// # Errors
     /// A value that is not finite.
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
-    /// Whether stability limited most of the steps since the start of the run, of those whose
-    /// errors may count more than once.
+    /// Whether stability limited the majority of accepted steps of the run, counting only those
+    /// with a global error factor.
     fn is_stiff(&self) -> bool;
-    /// Whether rounding errors limited most of the steps since the start of the run.
+    /// Whether rounding errors limited the majority of attempts of the run.
     fn is_limited_by_rounding(&self) -> bool;
-    /// How often the model was evaluated since this was asked for last.
+    /// The number of model evaluations since the last call.
     fn take_evaluation_count(&mut self) -> usize;
 }
 
 pub struct PairStepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<StepMemory<M, T, S>>,
-    /// How the step that was taken changes the branches of the model, if it does.
+    /// The change of branches over the last attempted step, if any.
     branch_change: Option<BranchChange>,
-    /// Steps at the bound of stability less those that are not.
+    /// The number of steps at the stability bound, minus the number of others.
     stability_limited_minus_unlimited: i64,
     rounding: RoundingErrors,
     method: PhantomData<fn() -> B>,
@@ -101,7 +101,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S
         })
     }
 
-    /// The derivative at a state.
+    /// Evaluates the derivative at a state.
     fn evaluate_derivative(
         scheme: &Scheme<M, T, S>,
         point: &mut StagePoint<M, T>,
@@ -120,12 +120,13 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S
 }
 
 impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S> {
-    /// How often an error counts that counts so often at most: once where the Jacobian takes it
-    /// back, as where it is damped, and by [`Pair::GLOBAL_ERROR_FACTOR`] where it turns it or lets
-    /// it grow. The last stage `Y` is at the end, as the step is; of the difference `d` of the two
-    /// and `J d` the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of
-    /// stability, or not (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section
-    /// IV.2).
+    /// The global error factor of this step, from one for damped errors to `count` for others; see
+    /// [`EmbeddedPair::GLOBAL_ERROR_FACTOR`].
+    ///
+    /// The last stage `Y` is at the end of the step. With `d = x_next − Y` the flow damps the error
+    /// if `d` and `J d` have opposite directions; the factor decreases with the squared cosine of
+    /// their angle. A step is at the stability bound if `h |J d|/|d|` reaches it (E. Hairer, G.
+    /// Wanner, Solving Ordinary Differential Equations II, section IV.2).
     fn global_error_factor(&mut self, count: f64) -> f64 {
         if count <= 1.0 {
             return 1.0;
@@ -143,7 +144,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S
             distances = distances + distance * distance;
             changes = changes + change * change;
         }
-        // Scales have the factor `h`, and so have the changes.
+        // The factor `h` is contained in the scales, and thus in the changes.
         let is_at_bound = changes.to_f64() > B::STABILITY_BOUND * B::STABILITY_BOUND * distances.to_f64();
         self.stability_limited_minus_unlimited += if is_at_bound { 1 } else { -1 };
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
@@ -154,7 +155,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S
 
 impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S> {
     /// Measures the rounding error of the difference in a step of this length, with the scales of
-    /// the step that was taken: see [`RoundingErrors`].
+    /// the last step; see [`RoundingErrors`].
     fn measure_rounding(&mut self, t: T, size: f64) {
         let Self { scheme, memory, rounding, .. } = self;
         let StepMemory { point, stage_record: record, dense_stages: [slope, ..], difference, scale, .. } =
@@ -162,7 +163,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S
         for (to, x) in difference.as_mut().iter_mut().zip(record.x.as_ref()) {
             *to = *x * T::from_f64(1.0 + 2.0 * T::EPSILON * rounding.random_sign());
         }
-        // Next to the states there need be no value.
+        // The model may be undefined beside the solution.
         if Self::evaluate_derivative(scheme, point, difference.as_ref(), t, slope).is_err() {
             return;
         }
@@ -192,7 +193,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> ExplicitStepper<M, T> 
         (self.stability_limited_minus_unlimited, self.rounding) = (0, RoundingErrors::default());
         let StepMemory { point, stage_record: record, .. } = &mut *self.memory;
         point.variables_mut().copy_from_slice(inputs);
-        // An explicit model is evaluated at `ẋ = 0`.
+        // Explicit models are evaluated at `ẋ = 0`.
         point.variables_mut()[..M::Shape::NX].fill(T::ZERO);
         record.x.as_mut().copy_from_slice(x);
     }
@@ -259,7 +260,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> ExplicitStepper<M, T> 
         let fine = difference_of(&stages);
         let coarse = B::THIRD_ORDER.as_ref().map(difference_of);
         let error = B::combined_estimate(fine, coarse);
-        // Written so that NaN stays.
+        // NaN is rejected.
         if error > 1.0 {
             return Ok(error);
         }
@@ -323,7 +324,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> ExplicitStepper<M, T> 
             let time = t + h * T::from_f64(stage.node);
             Self::evaluate_derivative(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
         }
-        // Nested: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
+        // Nested form: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
         let rest = T::ONE - theta;
         let to = dense.x.as_mut_slice();
         to.fill(T::ZERO);

@@ -1,7 +1,7 @@
-//! The lines themselves: an expression for each row or pivot.
+//! Unrolled loops: an expression for each row or pivot.
 //!
-//! The compiler looks at all of them for each function that goes this way, short or not, and finds
-//! their constants: without optimisation that took most of its time.
+//! The compiler evaluates the constants of all expressions in each function that is unrolled,
+//! whatever its length: without optimisation that dominates its time.
 #![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
 
 use super::{PivotVisitor, RowVisitor, SupernodeVisitor, update_count};
@@ -10,10 +10,10 @@ use crate::model::{Elimination, Pivot, Update};
 use crate::plan::Plan;
 use core::marker::PhantomData;
 
-/// So many rows are left to the optimiser to unroll: as often it looks what constants simplify.
+/// Number of rows per chunk, which the optimiser unrolls: each expression costs compile time.
 const CHUNK: usize = 10;
 
-/// One expression for each number from zero on, or down to zero.
+/// One expression for each number from zero up, or down to zero.
 macro_rules! forwards {
     ($each:ident!($($arguments:tt)*)) => {
         $each!($($arguments)*: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23
@@ -27,7 +27,7 @@ macro_rules! backwards {
     };
 }
 
-/// A chunk of rows.
+/// The expression for a chunk of rows.
 macro_rules! chunk {
     ($A:ty, $V:ty, $visit:ident: $($n:literal)*) => {
         $(if const { $n * CHUNK < rows::<$V>() } {
@@ -38,7 +38,7 @@ macro_rules! chunk {
     };
 }
 
-/// The rows of a table, which are known.
+/// The number of rows of a table.
 const fn rows<V: RowVisitor>() -> usize {
     match V::ROWS {
         Some(rows) => rows,
@@ -55,7 +55,7 @@ pub fn for_each_row<A: Arithmetic, V: RowVisitor>(visitor: &mut V) {
     forwards!(chunk!(A, V, visitor));
 }
 
-/// A pivot.
+/// The expression for a pivot.
 macro_rules! pivot {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
         $(if const { NthPivot::<$M, $n>::EXISTS } && let Some((pivot, updates)) = NthPivot::<$M, $n>::PIVOT {
@@ -64,7 +64,7 @@ macro_rules! pivot {
     };
 }
 
-/// A supernode. There is the code for its own size alone.
+/// The expression for a supernode, with the code for its size only.
 macro_rules! supernode {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
         $(sizes!($A, $M, $visit, $n: 1 2 3 4);)*
@@ -80,8 +80,7 @@ macro_rules! sizes {
     };
 }
 
-/// A pivot of a plan by its number: found once for each model, and not once more for each function
-/// that goes through its pivots.
+/// Pivot `N` of a plan, evaluated once for each model instead of once for each function.
 struct NthPivot<M, const N: usize>(PhantomData<M>);
 
 impl<M: Plan, const N: usize> NthPivot<M, N> {
@@ -92,7 +91,7 @@ impl<M: Plan, const N: usize> NthPivot<M, N> {
     };
 }
 
-/// A pivot and its updates.
+/// Returns pivot `n` and its updates.
 const fn nth(plan: &Elimination, n: usize) -> Option<(&'static Pivot, &'static [Update])> {
     if n >= plan.pivots.len() {
         return None;
@@ -106,7 +105,7 @@ const fn nth(plan: &Elimination, n: usize) -> Option<(&'static Pivot, &'static [
     Some((pivot, plan.updates.split_at(begin).1.split_at(update_count(pivot)).0))
 }
 
-/// The pivots of a supernode by its number, if it has so many.
+/// The pivots of supernode `N`, if it has `SIZE` of them.
 struct NthSupernode<M, const N: usize, const SIZE: usize>(PhantomData<M>);
 
 impl<M: Plan, const N: usize, const SIZE: usize> NthSupernode<M, N, SIZE> {
@@ -152,12 +151,12 @@ pub fn supernodes_backward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(visitor:
 
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
-    use super::super::MAX_LINES;
+    use super::super::MAX_UNROLLED_PIVOTS;
     use super::*;
     use crate::linalg::kernel::arithmetic::Unfused;
     use alloc::vec::Vec;
 
-    /// Writes down where it comes by.
+    /// Records the visited rows.
     struct Path<const ROWS: usize>(Vec<usize>);
 
     impl<const ROWS: usize> RowVisitor for Path<ROWS> {
@@ -180,7 +179,7 @@ mod tests {
         rows::<1>();
         rows::<CHUNK>();
         rows::<{ CHUNK + 1 }>();
-        rows::<{ MAX_LINES * CHUNK - 1 }>();
-        rows::<{ MAX_LINES * CHUNK }>();
+        rows::<{ MAX_UNROLLED_PIVOTS * CHUNK - 1 }>();
+        rows::<{ MAX_UNROLLED_PIVOTS * CHUNK }>();
     }
 }

@@ -1,4 +1,4 @@
-//! The equations of the stages of an interval, at stages that need not solve them.
+//! Stage equations of an interval, evaluated at stages that need not satisfy them.
 
 use crate::irk::{Coefficients, dot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorX, VectorZ};
@@ -8,7 +8,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// Where stages lead to.
+/// The end of an interval by its stages.
 pub(super) struct IntervalEnd<M: Dae, T: Real> {
     /// The state at the end of the interval.
     pub x: VectorX<M, T>,
@@ -16,20 +16,20 @@ pub(super) struct IntervalEnd<M: Dae, T: Real> {
     pub z0: VectorZ<M, T>,
 }
 
-/// An interval, from step to step.
+/// Evaluates the stage equations of an interval, step by step.
 pub(super) struct StageEquations<'a, M: Dae, T: Real, const S: usize> {
     coefficients: &'a Coefficients<T, S>,
     /// The state at the start of the step.
     x: ArrayX<M, T>,
-    /// The variables at a stage.
+    /// The variables at the current stage.
     v: ArrayV<M, T>,
-    /// The length of a step, and the time where the interval begins.
+    /// The length of a step, and the time at the start of the interval.
     h: T,
     t: T,
 }
 
 impl<'a, M: Dae, T: Real, const S: usize> StageEquations<'a, M, T, S> {
-    /// The start of an interval of so many steps.
+    /// The equations at the start of an interval with this number of steps.
     pub fn at_start(interval: &Interval<'_, T>, coefficients: &'a Coefficients<T, S>, steps: usize) -> Self {
         let (mut x, mut v) = (ArrayX::<M, T>::zeroed(), ArrayV::<M, T>::zeroed());
         copy_common(x.as_mut(), interval.x);
@@ -41,7 +41,8 @@ impl<'a, M: Dae, T: Real, const S: usize> StageEquations<'a, M, T, S> {
         Self { coefficients, x, v, h: interval.h / T::from_whole(steps), t: interval.t }
     }
 
-    /// Where stages `y + α Δy` lead to, and the sum of all `|h f|` at them and the largest one.
+    /// Returns the end of the interval by the stages `y + α Δy`, and the sum and the maximum of
+    /// `|h f|` at these stages.
     pub fn end_and_residuals(
         mut self,
         stages: &[ArrayK<M, [T; S]>],

@@ -1,19 +1,19 @@
-//! Direct collocation: stages of the integrator are variables of the problem, which go with its
-//! iterates.
+//! Direct collocation: the stages of the integrator are variables of the problem, and converge with
+//! its iterates.
 //!
 //! ```text
 //! G(y, w) = 0,  x_{k+1} = E(y, w)        w = (x_k, u_k), y = (k_i, z_i) of all stages
 //! Δy = a + D Δw                          a = −G_y⁻¹ G,  D = −G_y⁻¹ G_w
 //! ```
 //!
-//! The QP keeps the size of that of multiple shooting: stages are eliminated interval by interval,
-//! by the plan of the model. It has `E(y + a)` for the end of an interval, `E_y D + E_w` for its
-//! derivatives, and `[I; D]ᵀ ∇²(μᵀG) [I; D]` with `μ` of the adjoint for its Hessian. What `a` adds
-//! to the gradient, `Dᵀ ∇²(μᵀG) a`, is the change of `πᵀ dE/dw` from `y` to `y + a`, to first
-//! order.
+//! The QP has the size of multiple shooting: stages are eliminated interval by interval, by the
+//! elimination plan of the model. It has `E(y + a)` for the end of an interval, `E_y D + E_w` for
+//! its derivatives, and `[I; D]ᵀ ∇²(μᵀG) [I; D]` with the adjoint `μ` for its Hessian. The gradient
+//! term of `a`, `Dᵀ ∇²(μᵀG) a`, is the change of `πᵀ dE/dw` from `y` to `y + a`, to first order.
 //!
-//! A solver that knows stages lets them go as far as the rest, `y + α Δy`, and holds `h G` for a
-//! part of the violation. Others have `y + a + D (w − w̄)`.
+//! Solvers that support stages as variables update them with the step length of the iterate,
+//! `y + α Δy`, and add `h G` to the violation. For other solvers the stages are
+//! `y + a + D (w − w̄)`.
 //!
 //! R. Quirynen, S. Gros, B. Houska, M. Diehl, "Lifted collocation integrators for direct optimal
 //! control in ACADO toolkit", Math. Program. Comput. 9 (2017).
@@ -42,18 +42,18 @@ use equations::StageEquations;
 
 type Irk<M, B, const S: usize, T> = Integrator<M, B, S, T, Heap>;
 
-/// Direct collocation as dynamics, with the tableau of an implicit integrator: the same discrete
-/// solution as that of multiple shooting.
+/// Direct collocation as dynamics, with the tableau of an implicit integrator. The discrete
+/// solution is the same as with multiple shooting.
 ///
 /// ```text
 /// f(k_i, x + h Σ_j a_ij k_j, u, z_i, p, t_i) = 0        x₊ = x + h Σ_i b_i k_i
 /// ```
 ///
-/// `k_i` and `z_i` are variables that [`Ipm`](crate::ocp::Ipm) moves together with states and
-/// controls, with the same length of step; no iteration of Newton's method is for stages alone.
-/// They begin between the states of the guess, `k_i = (x_{k+1} − x_k)/h`, and `z_i` at the nominal
-/// values of the model. A guess need not be one that can be integrated: far from a solution this is
-/// more robust than [`Shooting`](crate::ocp::Shooting).
+/// [`Ipm`](crate::ocp::Ipm) updates the variables `k_i` and `z_i` together with states and
+/// controls, with the same step length; there is no inner Newton iteration. Initial stages follow
+/// from the guess: `k_i = (x_{k+1} − x_k)/h`, and `z_i` are the nominal values of the model. The
+/// guess need not be integrable: far from a solution this is more robust than
+/// [`Shooting`](crate::ocp::Shooting).
 ///
 /// ```
 /// # use casados_core::{Dae, Error, Gauss, Irk, Options};
@@ -65,20 +65,20 @@ type Irk<M, B, const S: usize, T> = Integrator<M, B, S, T, Heap>;
 /// # }
 /// ```
 pub struct Collocation<M: Dae, B, const S: usize, T: Real> {
-    /// Differentiates at the stages that there are.
+    /// Differentiates at the current stages.
     stage_differentiator: Irk<M, B, S, T>,
-    /// Goes one iteration of Newton's method from there, and differentiates again.
+    /// Takes one Newton iteration from the current stages, and differentiates at the result.
     newton_integrator: Irk<M, B, S, T>,
     coefficients: Coefficients<T, S>,
     /// `y` of every step of every interval.
     stages: Vec<ArrayK<M, [T; S]>>,
-    /// `a`
+    /// The Newton increments `a`.
     newton_increments: Vec<ArrayK<M, [T; S]>>,
-    /// `Δy`
+    /// The steps `Δy`.
     stage_steps: Vec<ArrayK<M, [T; S]>>,
-    /// Those of the best iterate.
+    /// The stages of the best iterate.
     best_stages: Vec<ArrayK<M, [T; S]>>,
-    /// `w̄`, where increments are from.
+    /// The point `w̄` of the linearisation.
     linearisation_point: Vec<T>,
 }
 
@@ -88,7 +88,7 @@ impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Collocation<M, B, 
     }
 }
 
-/// The same stages, and integrators with memory of their own.
+/// Copies the stages, and creates integrators with their own memory.
 impl<M: Dae, B, const S: usize, T: Real> Clone for Collocation<M, B, S, T> {
     fn clone(&self) -> Self {
         Self {
@@ -105,10 +105,10 @@ impl<M: Dae, B, const S: usize, T: Real> Clone for Collocation<M, B, S, T> {
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
-    /// With the steps and the tableau of an integrator.
+    /// Direct collocation with the steps and the tableau of an integrator.
     ///
     /// # Errors
-    /// Those of making an integrator.
+    /// The errors of creating an integrator.
     pub fn new(integrator: Irk<M, B, S, T>) -> Result<Self, Error> {
         let tableau = *integrator.tableau();
         Ok(Self {
@@ -123,8 +123,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         })
     }
 
-    /// Iterations of Newton's method that the last derivatives of an interval took: one for each
-    /// step, which finds `a`. Points that are tried take none.
+    /// Returns the number of Newton iterations of the last derivatives of an interval: one for each
+    /// step, which computes `a`. Trial points need none.
     #[must_use]
     pub fn iterations(&self) -> usize {
         self.stage_differentiator.statistics().iterations + self.newton_integrator.statistics().iterations
@@ -134,7 +134,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         self.stage_differentiator.options().steps
     }
 
-    /// Stages between the states of a guess, with the nominal values of algebraic states.
+    /// Initialises the stages by the slopes between the states of a guess and the nominal values of
+    /// algebraic states.
     fn interpolate_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
         let (steps, nx) = (self.step_count(), M::Shape::NX);
         let count = nodes.len().saturating_mul(steps);
@@ -161,7 +162,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         Ok(())
     }
 
-    /// Stages for all intervals; those of a solver that does not know them follow its iterate.
+    /// Initialises the stages if their number has changed; for solvers without stages as variables,
+    /// moves them to the iterate.
     fn update_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
         if self.stages.len() != nodes.len() * self.step_count() {
             return self.interpolate_stages(nodes);
@@ -172,7 +174,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         Ok(())
     }
 
-    /// `Δy = a + D (w − w̄)`, if there is a `w̄`.
+    /// Computes `Δy = a + D (w − w̄)`; returns false without a `w̄`.
     fn compute_stage_steps(&mut self, nodes: &Nodes<'_, T>) -> Result<bool, OcpError> {
         if self.linearisation_point.len() != nodes.v.len() {
             return Ok(false);
@@ -185,7 +187,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         result.map(|()| true)
     }
 
-    /// `Δy = a + D Δw`
+    /// Computes `Δy = a + D Δw`.
     fn expand_steps_at(&mut self, nodes: &Nodes<'_, T>, steps: &Nodes<'_, T>) -> Result<(), OcpError> {
         let count = self.step_count();
         for (k, (interval, step)) in nodes.iter().zip(steps.iter()).enumerate() {
@@ -208,13 +210,13 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         Ok(())
     }
 
-    /// Stages go a part of their way.
+    /// Updates the stages by the step length `alpha`.
     fn take_step(&mut self, alpha: T) {
         add_scaled_steps::<M, S, T>(&mut self.stages, &self.stage_steps, alpha);
     }
 
-    /// All intervals at their stages: derivatives of `order` 1 or 2, and ends and algebraic states
-    /// after one iteration of Newton's method.
+    /// Evaluates all intervals at their stages: derivatives of `order` 1 or 2, and ends and
+    /// algebraic states after one Newton iteration.
     fn differentiate(
         &mut self,
         nodes: &Nodes<'_, T>,
@@ -274,7 +276,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     }
 }
 
-/// Stages go a part of their way.
+/// Adds `alpha` times the steps to the stages.
 fn add_scaled_steps<M: Dae, const S: usize, T: Real>(
     stages: &mut [ArrayK<M, [T; S]>],
     change: &[ArrayK<M, [T; S]>],
@@ -338,7 +340,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
         self.differentiate(nodes, forward::<M, B, S, T>, false, sink)
     }
 
-    /// By the polynomials through the stages as they are.
+    /// Evaluates the polynomials through the current stages.
     fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
         let count = self.step_count();
         if self.stages.len() != nodes.len() * count {

@@ -1,4 +1,4 @@
-//! Every mistake in a problem, and what can go wrong where it is evaluated; `messages` say it.
+//! Errors of a problem and of its evaluation; `messages` formats them.
 
 mod named;
 
@@ -11,8 +11,7 @@ use crate::error::Error;
 use crate::ocp::formulation::names::Names;
 use crate::qp::{QpError, QpField};
 
-/// What is wrong with a problem, or what went wrong where it was evaluated: what, at which stage,
-/// and the values.
+/// An error in a problem or in its evaluation, with names, stage and values.
 ///
 /// ```
 /// use casados::ocp::{GeneralCost, Horizon, Map, OcpError, Problem};
@@ -33,56 +32,56 @@ use crate::qp::{QpError, QpField};
 #[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum OcpError {
-    /// No state or control has this name.
+    /// No variable has this name.
     UnknownName {
         /// The name.
         name: Text,
-        /// Those that there are.
+        /// The names of the model.
         known: &'static Names,
     },
     /// A stage that the horizon does not have.
     NoSuchStage {
-        /// What was to be set.
+        /// The part to be set.
         part: Part,
         /// The stage.
         stage: usize,
-        /// How many stages have such a part.
+        /// The number of stages with this part.
         stages: usize,
     },
-    /// A range of stages that has none.
+    /// An empty range of stages.
     EmptyRange {
-        /// What was to be set.
+        /// The part to be set.
         part: Part,
-        /// Where the range begins.
+        /// The start of the range.
         start: usize,
-        /// Before which stage it ends.
+        /// The end of the range (exclusive).
         end: usize,
-        /// How many stages have such a part.
+        /// The number of stages with this part.
         stages: usize,
     },
-    /// Bounds were to be made soft, and there are none.
+    /// There are no bounds to be softened.
     NoBound {
-        /// The states or controls.
+        /// The name of the variables or constraints.
         name: Text,
         /// The first stage.
         start: usize,
-        /// The stage behind the last one.
+        /// The stage after the last one.
         end: usize,
     },
-    /// A length is not what the problem asks for.
+    /// A length differs from that of the problem.
     Length {
-        /// What is too short or too long.
+        /// The part with this length.
         part: Part,
-        /// The stage, 0 where it is the whole horizon.
+        /// The stage; 0 for the whole horizon.
         stage: usize,
-        /// The length that is needed.
+        /// The required length.
         expected: usize,
-        /// The length that was given.
+        /// The given length.
         found: usize,
     },
-    /// A number is infinite or NaN and must not be, or a penalty is negative.
+    /// A number is infinite or NaN where it must be finite, or a penalty is negative.
     InvalidValue {
-        /// Of what.
+        /// The part.
         part: Part,
         /// The stage.
         stage: usize,
@@ -93,7 +92,7 @@ pub enum OcpError {
         /// Its value.
         value: f64,
     },
-    /// The weights of a least-squares cost are no symmetric, positive semidefinite matrix.
+    /// The weights of a least-squares cost are not a symmetric, positive semidefinite matrix.
     InvalidWeight {
         /// The function.
         function: &'static str,
@@ -101,19 +100,19 @@ pub enum OcpError {
         outputs: [usize; 2],
         /// The weight.
         value: f64,
-        /// What it has to be.
+        /// The requirement.
         allowed: &'static str,
     },
-    /// The weights of an arrival cost are no symmetric, positive semidefinite matrix.
+    /// The weights of an arrival cost are not a symmetric, positive semidefinite matrix.
     InvalidArrivalWeight {
         /// The row and the column: two of the states.
         states: [&'static str; 2],
         /// The weight.
         value: f64,
-        /// What it has to be.
+        /// The requirement.
         allowed: &'static str,
     },
-    /// Times of nodes do not increase.
+    /// The times of the nodes do not increase.
     Times {
         /// The interval.
         interval: usize,
@@ -124,7 +123,7 @@ pub enum OcpError {
     },
     /// A lower bound is above the upper one.
     CrossedBounds {
-        /// Which bounds.
+        /// The kind of bounds.
         part: Part,
         /// The stage.
         stage: usize,
@@ -132,26 +131,26 @@ pub enum OcpError {
         name: &'static str,
         /// The element, or the output of the function.
         index: usize,
-        /// Its lower bound.
+        /// The lower bound.
         lower: f64,
-        /// Its upper bound.
+        /// The upper bound.
         upper: f64,
     },
-    /// Nobody said what this is.
+    /// A required part is not set.
     Missing {
-        /// What.
+        /// The part.
         part: Part,
         /// The stage.
         stage: usize,
     },
-    /// A cost or constraint depends on something that does not exist where it is evaluated:
-    /// algebraic states or controls at the end of the horizon, algebraic states of a map.
+    /// A cost or constraint depends on a variable that does not exist at its node: algebraic states
+    /// or controls at the end of the horizon, algebraic states of a map.
     NotThere {
         /// The function.
         function: &'static str,
         /// The variable.
         variable: &'static str,
-        /// Whether at the end of the horizon.
+        /// Whether the node is the end of the horizon.
         terminal: bool,
     },
     /// A function has a value that is not finite.
@@ -160,122 +159,128 @@ pub enum OcpError {
         function: &'static str,
         /// The stage.
         stage: usize,
-        /// Which of its outputs, or zero of a sum.
+        /// The output; zero for a sum.
         output: usize,
         /// The value.
         value: f64,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
-    /// A derivative is not finite where everything has a value: there is no QP.
+    /// A derivative is not finite at a point where all functions are: there is no QP.
     NonFiniteDerivative {
-        /// Where it is in the QP: `A`, `B` of dynamics, `C`, `D` of constraints, gradients of
-        /// costs; `Q`, `R`, `S` are second derivatives.
+        /// The part of the QP: `A`, `B` of dynamics, `C`, `D` of constraints, gradients of costs;
+        /// `Q`, `R`, `S` are second derivatives.
         field: QpField,
         /// The stage.
         stage: usize,
-        /// What is differentiated: a state at the end of the interval or a constraint; or the first
-        /// variable of a second derivative.
+        /// The differentiated quantity: a state at the end of the interval or a constraint; or the
+        /// first variable of a second derivative.
         of: &'static str,
-        /// The output of a constraint; zero of others.
+        /// The output of a constraint, otherwise zero.
         output: usize,
-        /// The variable.
+        /// The variable of the derivative.
         by: &'static str,
         /// The value.
         value: f64,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
-    /// A derivative of the solution is not finite: numbers of the problem are too far from one.
+    /// A derivative of the solution is not finite: the problem is badly scaled.
     NonFiniteSensitivity {
         /// The stage.
         stage: usize,
         /// The state or control of the solution.
         of: &'static str,
-        /// What it is differentiated by: a state at the start, or a parameter.
+        /// The variable of the derivative: an initial state or a parameter.
         by: &'static str,
         /// The value.
         value: f64,
     },
-    /// An interval has no result.
+    /// The integration of an interval failed.
     Integration {
-        /// Which.
+        /// The interval.
         interval: usize,
-        /// Why.
+        /// The error of the integrator.
         error: Error,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
-    /// The simulation of a guess ends in an interval
+    /// The simulation of a guess failed in an interval
     /// ([`Ocp::guess_by_simulation`](crate::ocp::Ocp::guess_by_simulation)).
     Simulation {
-        /// Which.
+        /// The interval.
         interval: u32,
         /// The largest state at its start.
         state: &'static str,
         /// Its value, in single precision.
         value: f32,
-        /// Why.
+        /// The error of the integrator.
         error: Error,
     },
-    /// Stages of intervals are variables, as of `Collocation`: a simulation needs an integrator,
-    /// `Ocp::guess_by_simulation_with`.
+    /// The dynamics have stages as variables, as `Collocation` has: a simulation needs an
+    /// integrator, `Ocp::guess_by_simulation_with`.
     NoIntegrator,
-    /// Data say nothing of a variable, or of a combination that it is part of: it has no variance.
+    /// The data do not determine a variable, or a combination with it: it has no variance.
     NotIdentifiable {
         /// The state or control.
         name: &'static str,
         /// The stage.
         stage: usize,
     },
-    /// An integrator beside the problem, as that of a simulation, has no result.
+    /// A separate integrator, as that of a simulation, failed.
     Integrator(Error),
-    /// A batch beside the problem was given slices of different lengths.
+    /// A separate batch was given slices of different lengths.
     #[cfg(feature = "alloc")]
     Batch(BatchError),
-    /// There are no consistent states to start from.
+    /// No consistent initial states were found.
     Inconsistent(Inconsistent),
     /// States are periodic or controls shared: feedback gains are not defined.
     /// [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) has `du/dx₀`.
     Coupled,
-    /// Parameters are free: derivatives of solutions by the others are not known there.
+    /// Parameters are free: derivatives by the other parameters are not supported.
     FreeParameters,
-    /// The last run did not end at a solution: there are no derivatives of it.
+    /// The last run did not end at a solution: derivatives are not defined.
     NoSolution,
-    /// The end of the horizon is free, and no parameter of the model is its duration.
+    /// The end time is free, but no parameter of the model is its duration.
     FixedEndTime {
         /// The model.
         model: &'static str,
     },
-    /// Something that cannot be said of this problem.
+    /// A feature that this problem does not support.
     Unsupported {
-        /// What.
+        /// The feature.
         what: &'static str,
-        /// What can be said instead.
+        /// The alternative.
         remedy: &'static str,
     },
-    /// The end of the horizon is free, and a function depends on the time of the integrator.
+    /// The end time is free, and a function depends on the time of the integrator.
     DependsOnTime {
         /// The function.
         function: &'static str,
     },
-    /// Points inside of intervals are parts of these that increase, between 0 and 1.
+    /// Points inside intervals must be increasing fractions between 0 and 1.
     InvalidPoint {
-        /// Which of the points.
+        /// The index of the point.
         index: usize,
-        /// The part of an interval.
+        /// The fraction.
         value: f64,
     },
     /// The model has no parameter of this name.
     UnknownParameter {
         /// The name.
         name: Text,
-        /// Those that there are.
+        /// The names of the model.
         known: &'static Names,
     },
-    /// The guess of a free parameter is outside of its range.
+    /// The guess of a free parameter is outside its range.
     OutOfRange {
         /// The parameter.
         name: &'static str,
         /// The guess.
         value: f64,
-        /// The range.
+        /// The lower limit of the range.
         lower: f64,
-        /// Its end.
+        /// The upper limit of the range.
         upper: f64,
     },
     /// An option of the solver is out of its range.
@@ -284,36 +289,50 @@ pub enum OcpError {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
-    /// A link between phases does not fit them.
+    /// The dimensions of a link do not match its phases.
     LinkDimension {
         /// The function of the link.
         link: &'static str,
-        /// Which of its arguments, or its outputs.
+        /// The argument or the outputs with this dimension.
         what: &'static str,
-        /// The length that the phases ask for.
+        /// The dimension of the phases.
         expected: usize,
-        /// Its length.
+        /// The dimension of the link.
         found: usize,
     },
-    /// Something that a phase of several cannot have.
+    /// A phase has a feature that phases do not support.
     Phase {
-        /// Which, from 0 on.
+        /// The phase, counted from 0.
         phase: usize,
-        /// Its model.
+        /// The model of the phase.
         model: &'static str,
-        /// What.
+        /// The feature.
         what: &'static str,
     },
-    /// The QP has no solution.
+    /// The QP solver failed.
     Qp(QpError),
     /// Memory could not be allocated.
     OutOfMemory {
-        /// How much was asked for.
+        /// The size of the allocation.
         bytes: usize,
     },
+}
+
+impl OcpError {
+    /// As an error of this phase.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn in_phase(mut self, index: usize) -> Self {
+        if let Self::Integration { phase, .. }
+        | Self::NonFiniteFunction { phase, .. }
+        | Self::NonFiniteDerivative { phase, .. } = &mut self
+        {
+            *phase = u32::try_from(index).ok();
+        }
+        self
+    }
 }
 
 impl From<QpError> for OcpError {
@@ -338,7 +357,9 @@ impl From<Error> for OcpError {
 impl From<BatchError> for OcpError {
     fn from(error: BatchError) -> Self {
         match error {
-            BatchError::Intervals { first, error, .. } => Self::Integration { interval: first, error },
+            BatchError::Intervals { first, error, .. } => {
+                Self::Integration { interval: first, error, phase: None }
+            }
             BatchError::Integrator(error) => error.into(),
             BatchError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
             error @ BatchError::Length { .. } => Self::Batch(error),

@@ -1,4 +1,4 @@
-//! What an error names: a part of a problem, a name, a constraint.
+//! Names in errors: parts of a problem, variables, constraints.
 
 use crate::qp::Side;
 use core::fmt;
@@ -40,7 +40,7 @@ pub enum Part {
     Parameters,
     /// Ranges of free parameters.
     ParameterBounds,
-    /// The state at the start.
+    /// The initial state.
     InitialState,
     /// Weights of an arrival cost.
     Arrival,
@@ -66,7 +66,7 @@ pub enum Part {
     Memory,
 }
 
-/// A name in an error: its first bytes.
+/// A name in an error, truncated to its first bytes.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -101,7 +101,7 @@ impl Text {
         }
         Self { bytes, length }
     }
-    /// The text.
+    /// Returns the text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         self.bytes.get(..self.length).and_then(|bytes| core::str::from_utf8(bytes).ok()).unwrap_or_default()
@@ -114,7 +114,7 @@ impl fmt::Debug for Text {
     }
 }
 
-/// A constraint by its name.
+/// The name of a constraint.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -136,19 +136,19 @@ impl fmt::Debug for Text {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConstraintName {
-    /// What kind of bounds.
+    /// The kind of bounds.
     pub part: Part,
     /// The stage.
     pub stage: usize,
     /// The state or control, or the function.
     pub name: &'static str,
-    /// The output of the function; zero of others.
+    /// The output of the function, otherwise zero.
     pub output: usize,
-    /// Which of the points inside of the interval ([`Ocp::inside`](crate::ocp::Ocp::inside)), from
-    /// 1 on; 0 is the node.
+    /// The point inside the interval ([`Ocp::inside`](crate::ocp::Ocp::inside)), counted from 1; 0
+    /// is the node.
     pub point: usize,
     /// The side.
     pub side: Side,
-    /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+    /// The [phase](crate::ocp::Phases), counted from 0, if there are several.
     pub phase: Option<usize>,
 }

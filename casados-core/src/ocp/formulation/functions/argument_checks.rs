@@ -1,4 +1,5 @@
-//! Costs and constraints of the variables that dynamics have, for messages of the compiler.
+//! Traits that check the arguments of costs and constraints against the dynamics, for readable
+//! compiler messages.
 
 use crate::function::Function;
 use crate::ocp::formulation::functions::boundary::Boundary;
@@ -11,8 +12,8 @@ use crate::scalar::Real;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
 
-/// A cost of the variables that dynamics have. Messages of the compiler name the dynamics, where
-/// those of the other trait have dimensions as numbers.
+/// A cost whose arguments match the dynamics. Compiler messages then name the dynamics, instead of
+/// dimensions as numbers.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not fit the dynamics of this problem with numbers `{T}`",
     label = "a cost of this problem does not fit its dynamics",
@@ -29,8 +30,8 @@ impl<D: Dynamics<T>, T: Real, C: Cost<D::Shape, T> + IsCost<Functions: HasArgume
 {
 }
 
-/// Constraints of the variables that dynamics have. Messages of the compiler name the dynamics,
-/// where those of the other trait have dimensions as numbers.
+/// Constraints whose arguments match the dynamics. Compiler messages then name the dynamics,
+/// instead of dimensions as numbers.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not fit the dynamics of this problem with numbers `{T}`",
     label = "a constraint of this problem does not fit its dynamics",
@@ -54,7 +55,7 @@ impl<D: Dynamics<T>, T: Real, C: Constraints<D::Shape, T> + IsConstraint<Functio
     note = "a cost wraps a `#[function]`: `GeneralCost::<F>::new()` is the sum of its outputs, `LeastSquaresCost::<F>::diagonal(&weights)` half the weighted sum of their squares, `ConvexCost::<F, _>::new(function)` a convex function of them"
 )]
 pub trait IsCost {
-    /// The function, or the pair of them.
+    /// The function, or a pair of functions.
     type Functions;
 }
 
@@ -81,7 +82,7 @@ impl<F: Function, C, T: Real> IsCost for ConvexCost<F, C, T> {
     note = "a constraint wraps a `#[function]` with bounds of its outputs: `Constraint::<F>::new([lower], [upper])`"
 )]
 pub trait IsConstraint {
-    /// The function, or the pair of them.
+    /// The function, or a pair of functions.
     type Functions;
 }
 
@@ -110,7 +111,7 @@ where
 {
 }
 
-/// The same states, at the start.
+/// The argument `x0` matches the states of the model.
 #[diagnostic::on_unimplemented(
     message = "the boundary condition has the argument `x0: {Self}`, and the model `x: {Model}`",
     label = "its function has another argument `x0` than the states of the model",
@@ -119,10 +120,10 @@ where
 pub trait FirstStatesOf<Model> {}
 impl<X> FirstStatesOf<X> for X {}
 
-/// The one function of a cost or of constraints.
+/// The only function of a cost or of constraints.
 pub struct SingleFunction<F>(PhantomData<F>);
 
-/// Functions with the arguments of dynamics.
+/// A function whose arguments match the dynamics.
 pub trait HasArgumentsOf<D: Dynamics<T>, T: Real> {}
 
 impl<D: Dynamics<T>, T: Real> HasArgumentsOf<D, T> for () {}
@@ -139,7 +140,7 @@ where
 {
 }
 
-/// The same states.
+/// The argument `x` matches the states of the model.
 #[diagnostic::on_unimplemented(
     message = "the function has the argument `x: {Self}`, and the model `x: {Model}`",
     label = "its function has another argument `x` than the model",
@@ -148,7 +149,7 @@ where
 pub trait StatesOf<Model> {}
 impl<X> StatesOf<X> for X {}
 
-/// The same algebraic states.
+/// The argument `z` matches the algebraic states of the model.
 #[diagnostic::on_unimplemented(
     message = "the function has the argument `z: {Self}`, and the model `z: {Model}`",
     label = "its function has another argument `z` than the model",
@@ -157,7 +158,7 @@ impl<X> StatesOf<X> for X {}
 pub trait AlgebraicStatesOf<Model> {}
 impl<Z> AlgebraicStatesOf<Z> for Z {}
 
-/// The same controls.
+/// The argument `u` matches the controls of the model.
 #[diagnostic::on_unimplemented(
     message = "the function has the argument `u: {Self}`, and the model `u: {Model}`",
     label = "its function has another argument `u` than the model",
@@ -166,7 +167,7 @@ impl<Z> AlgebraicStatesOf<Z> for Z {}
 pub trait ControlsOf<Model> {}
 impl<U> ControlsOf<U> for U {}
 
-/// The same parameters.
+/// The argument `p` matches the parameters of the model.
 #[diagnostic::on_unimplemented(
     message = "the function has the argument `p: {Self}`, and the model `p: {Model}`",
     label = "its function has another argument `p` than the model",

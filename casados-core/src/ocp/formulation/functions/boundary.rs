@@ -1,4 +1,4 @@
-//! Conditions that connect the two ends of a horizon.
+//! Boundary conditions: constraints that couple the first and the last state.
 
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::check::Labels;
@@ -13,17 +13,16 @@ use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
-/// `lower ≤ r(x₀, x_N, p) ≤ upper` of the outputs of a function of the first state `x0`, the last
-/// one, `x`, and the parameters of the last node. A side may be infinite; equal bounds are an
+/// `lower ≤ r(x₀, x_N, p) ≤ upper` for the outputs of a function of the first state `x0`, the last
+/// state `x` and the parameters of the last node. A bound may be infinite; equal bounds are an
 /// equation.
 ///
-/// It is a terminal constraint, alone or in a pair with others, and has its names, bounds and
-/// multipliers in solutions. For each element of `x0` that the function depends on the QP has a
-/// shared variable, which is equal to it. That a state is periodic has a shorter form,
-/// [`Ocp::periodic`](crate::ocp::Ocp::periodic).
+/// It is a terminal constraint, alone or in a pair with others, with names, bounds and multipliers
+/// in solutions. The QP has a shared variable, equal to `x0[i]`, for each element `i` that the
+/// function depends on. For periodic states use [`Ocp::periodic`](crate::ocp::Ocp::periodic).
 ///
 /// # Example
-/// A car that comes back twice as fast as it left, a metre further on.
+/// A car returns with twice its initial speed, a metre further on.
 /// ```
 /// use casados::ocp::{Boundary, GeneralCost, HeapIpm, Horizon, Problem};
 /// use casados::prelude::*;
@@ -52,7 +51,7 @@ use bytemuck::Zeroable;
 pub struct Boundary<F: Function, T: Plain = f64> {
     lower: ArrayY<F, T>,
     upper: ArrayY<F, T>,
-    /// Penalties.
+    /// The linear penalties of soft bounds.
     linear: ArrayY<F, T>,
     quadratic: ArrayY<F, T>,
     v: ArrayV<F, T>,
@@ -64,7 +63,7 @@ pub struct Boundary<F: Function, T: Plain = f64> {
 plain!([F: Function, T: Plain] Boundary<F, T> { lower, upper, linear, quadratic, v, g, jacobian, hessian });
 
 impl<F: Function, T: Real> Boundary<F, T> {
-    /// With these bounds.
+    /// A boundary condition with these bounds.
     #[must_use]
     pub fn new(lower: ArrayY<F, T>, upper: ArrayY<F, T>) -> Self {
         let linear = Array::from_fn(|_| T::from_f64(f64::INFINITY));
@@ -81,7 +80,7 @@ impl<F: Function, T: Real> Boundary<F, T> {
         self
     }
 
-    /// Writes the variables of the function: `x₀` in the place of algebraic states.
+    /// Writes the variables of the function, with `x₀` in the place of algebraic states.
     fn load_variables<S: Shape>(&mut self, v: &S::ArrayV<T>, context: ConstraintContext<'_, T>) {
         let (nx, rest) = (S::NX, 2 * S::NX + S::NZ + S::NU);
         let variables = v.as_ref();
@@ -96,7 +95,7 @@ impl<F: Function, T: Real> Boundary<F, T> {
         }
     }
 
-    /// The index among `(x, w)` of a variable.
+    /// Returns the index of a variable in `(x, w)`.
     fn position<S: Shape>(variable: usize, context: ConstraintContext<'_, T>) -> Option<usize> {
         let nx = S::NX;
         if let Some(p) = parameter_index::<F::Shape>(variable) {
@@ -111,7 +110,7 @@ impl<F: Function, T: Real> Boundary<F, T> {
     }
 }
 
-/// How many elements of the first state a function depends on.
+/// Returns the number of elements of the first state that a function depends on.
 const fn copied_state_count<F: Function>() -> usize {
     let (variables, nx) = (F::STRUCTURE.variables, F::Shape::NX);
     let (mut index, mut count) = (0, 0);
@@ -125,7 +124,7 @@ const fn copied_state_count<F: Function>() -> usize {
     count
 }
 
-/// Which state one of these is.
+/// Returns the state that a copy is equal to.
 fn copied_state<F: Function>(copy: usize) -> usize {
     let nx = F::Shape::NX;
     let initial_states =
@@ -222,7 +221,7 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
             }
         });
     }
-    /// There are shared variables, and with these no derivatives by parameters.
+    /// Adds nothing: derivatives by parameters are not supported with shared variables.
     fn add_parameter_derivatives(
         &mut self,
         _: &S::ArrayV<T>,

@@ -13,25 +13,26 @@ use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
-/// Where constraints are evaluated.
+/// The node at which constraints are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstraintContext<'a, T> {
     pub(in crate::ocp) stage: usize,
-    /// Where variables are.
+    /// The positions of the free parameters.
     pub(in crate::ocp) free: FreeParametersView<'a>,
-    /// Copies of elements of the first state, and which of the shared variables the first one is.
+    /// The copies of elements of the first state, and the index of the first copy among the shared
+    /// variables.
     pub(in crate::ocp) initial_state_copies: &'a [T],
     pub(in crate::ocp) first_copy: usize,
 }
 
 impl<'a, T> ConstraintContext<'a, T> {
-    /// Of a stage with these shared variables, the first ones of which are the copies.
+    /// The context of a stage with the shared variables `w`, which begin with the copies.
     #[inline(always)]
     pub(in crate::ocp) fn new(stage: usize, free: FreeParametersView<'a>, w: &'a [T]) -> Self {
         Self { stage, free, initial_state_copies: w, first_copy: 0 }
     }
 
-    /// Without so many copies.
+    /// Returns the context without the first `count` copies.
     fn skip_copies(self, count: usize) -> Self {
         Self {
             initial_state_copies: self.initial_state_copies.get(count..).unwrap_or_default(),
@@ -41,8 +42,8 @@ impl<'a, T> ConstraintContext<'a, T> {
     }
 }
 
-/// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is
-/// both.
+/// Constraints at a node: functions of `(x, z, u, p, t)` with bounds. `()` is no constraint, a pair
+/// has the rows of both.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -65,36 +66,36 @@ impl<'a, T> ConstraintContext<'a, T> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Constraints<S: Shape, T: Real> {
-    /// How many rows.
+    /// The number of rows.
     const ROWS: usize;
     /// Whether they depend on algebraic states.
     const ALGEBRAIC: bool;
-    /// How many elements of the first state they depend on, of which the last stage has copies.
+    /// The number of elements of the first state that they depend on; the last stage has copies of
+    /// these.
     const INITIAL_STATE_COPIES: usize = 0;
 
-    /// Which state a copy is of.
+    /// Returns the state that a copy is equal to.
     #[doc(hidden)]
     fn copied_state(copy: usize) -> usize {
         copy
     }
-    /// Whether they depend on what is there only.
+    /// Checks that they depend on available variables only.
     ///
     /// # Errors
     /// [`OcpError::NotThere`]
     #[doc(hidden)]
     fn check(&self, there: AvailableVariables) -> Result<(), OcpError>;
-    /// Shows where the Jacobian and the Hessian over `(x, u, z)` may have entries; false if that is
-    /// not known.
+    /// Visits the structural entries of the Jacobian and the Hessian over `(x, u, z)`; returns
+    /// false if these are unknown.
     #[doc(hidden)]
     fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
         let _ = visit;
         Self::ROWS == 0
     }
-    /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and
-    /// quadratic penalties.
+    /// Writes the default bounds: lower and upper bounds, linear and quadratic penalties.
     #[doc(hidden)]
     fn bounds(&self, limits: [&mut [T]; 4]);
-    /// The values.
+    /// Evaluates the constraints.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -105,7 +106,7 @@ pub trait Constraints<S: Shape, T: Real> {
         values: &mut [T],
         context: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError>;
-    /// The values, and their derivatives: a column for each, `ld` apart.
+    /// Evaluates the constraints and their Jacobian, with a column for each constraint, `ld` apart.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -127,8 +128,8 @@ pub trait Constraints<S: Shape, T: Real> {
         context: ConstraintContext<'_, T>,
         terms: &mut QuadraticTerms<'_, T>,
     );
-    /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of
-    /// `μᵀg`, if `μ` is given.
+    /// Evaluates `∂g/∂p`, a row for each constraint. If `μ` is given, adds the derivative by the
+    /// parameters of the gradient of `μᵀg`.
     #[doc(hidden)]
     fn add_parameter_derivatives(
         &mut self,
@@ -137,10 +138,10 @@ pub trait Constraints<S: Shape, T: Real> {
         slopes: &mut [T],
         cross: &mut ParameterDerivatives<'_, T>,
     );
-    /// The function of a row, and which of its outputs it is.
+    /// Returns the function and the output of a row.
     #[doc(hidden)]
     fn name(row: usize) -> (&'static str, usize);
-    /// The unit of a row, if its function says one.
+    /// Returns the unit of a row, if its function has one.
     #[doc(hidden)]
     fn unit(_row: usize) -> &'static str {
         ""
@@ -275,7 +276,7 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
     }
 }
 
-/// `lower ≤ g(x, z, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal
+/// `lower ≤ g(x, z, u, p, t) ≤ upper` for the outputs of a function. A bound may be infinite; equal
 /// bounds are an equation.
 ///
 /// ```
@@ -307,7 +308,7 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
 pub struct Constraint<F: Function, T: Plain = f64> {
     lower: ArrayY<F, T>,
     upper: ArrayY<F, T>,
-    /// Penalties.
+    /// The linear penalties of soft bounds.
     linear: ArrayY<F, T>,
     quadratic: ArrayY<F, T>,
     g: ArrayY<F, T>,
@@ -318,7 +319,7 @@ pub struct Constraint<F: Function, T: Plain = f64> {
 plain!([F: Function, T: Plain] Constraint<F, T> { lower, upper, linear, quadratic, g, jacobian, hessian });
 
 impl<F: Function, T: Real> Constraint<F, T> {
-    /// With these bounds at every node.
+    /// Constraints with these bounds at every node.
     #[must_use]
     pub fn new(lower: ArrayY<F, T>, upper: ArrayY<F, T>) -> Self {
         let linear = Array::from_fn(|_| T::from_f64(f64::INFINITY));
@@ -436,7 +437,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
     }
 }
 
-/// Those of the outputs of a function.
+/// Returns the multipliers of the outputs of a function as an array.
 fn multiplier_array<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
     Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO))
 }

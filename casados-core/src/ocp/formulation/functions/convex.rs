@@ -14,7 +14,7 @@ use core::fmt;
 
 /// A convex function `φ(r)` of a residual with `NY` elements.
 ///
-/// A function of one's own, `¼ r⁴` of every residual:
+/// A user-defined function, `¼ r⁴` of every residual:
 ///
 /// ```
 /// use casados::ocp::{Convex, ConvexCost, HeapSqp, Horizon, Map, Problem};
@@ -49,21 +49,21 @@ use core::fmt;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Convex<T> {
-    /// `φ(r)`, its gradient, `NY`, and its Hessian, `NY × NY` with both triangles, which is
-    /// symmetric and positive semidefinite. Both are zero before the call.
+    /// Returns `φ(r)` and writes its gradient, `NY`, and its Hessian, `NY × NY` with both
+    /// triangles, which is symmetric and positive semidefinite. Both are zero before the call.
     fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T;
 
-    /// Whether its constants make sense.
+    /// Checks the constants of the function.
     ///
     /// # Errors
-    /// The first one that does not; problems say it as
+    /// The first invalid constant; problems return it as
     /// [`OcpError::InvalidWeight`](crate::ocp::OcpError::InvalidWeight).
     fn check(&self) -> Result<(), InvalidConstant> {
         Ok(())
     }
 }
 
-/// A constant of a [`Convex`] function that makes no sense.
+/// An invalid constant of a [`Convex`] function.
 ///
 /// ```
 /// use casados::ocp::{Convex, Huber};
@@ -73,16 +73,16 @@ pub trait Convex<T> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InvalidConstant {
-    /// The residual that it belongs to.
+    /// The index of its residual.
     pub output: usize,
     /// Its value.
     pub value: f64,
-    /// What it has to be.
+    /// The requirement.
     pub allowed: &'static str,
 }
 
-/// Huber's function of every residual, with a weight of its own: `½ w r²` where `|r| ≤ δ`, and
-/// `w δ (|r| − ½ δ)` where it is larger: outliers have a bounded force.
+/// The Huber function with a weight for each residual: `½ w r²` if `|r| ≤ δ`, otherwise
+/// `w δ (|r| − ½ δ)`. The gradient of outliers is bounded.
 ///
 /// P. J. Huber, "Robust estimation of a location parameter", Ann. Math. Statist. 35 (1964).
 ///
@@ -97,13 +97,13 @@ pub struct InvalidConstant {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Huber<T, const NY: usize> {
-    /// `w`, from zero on.
+    /// The nonnegative weights `w`.
     pub weights: [T; NY],
-    /// `δ`, positive, in the unit of its residual.
+    /// The positive thresholds `δ`, in the units of the residuals.
     pub delta: [T; NY],
 }
 
-/// The smooth sister of [`Huber`], with second derivatives everywhere:
+/// The pseudo-Huber function, a smooth form of [`Huber`] with second derivatives everywhere:
 /// `w δ² (√(1 + (r/δ)²) − 1)`.
 ///
 /// ```
@@ -117,13 +117,13 @@ pub struct Huber<T, const NY: usize> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PseudoHuber<T, const NY: usize> {
-    /// `w`, from zero on.
+    /// The nonnegative weights `w`.
     pub weights: [T; NY],
-    /// `δ`, positive, in the unit of its residual.
+    /// The positive thresholds `δ`, in the units of the residuals.
     pub delta: [T; NY],
 }
 
-/// `Σ w_i f(r_i, δ_i)` of a function with its first and second derivative.
+/// Evaluates `Σ w_i f(r_i, δ_i)`, where `f` returns its value and its first and second derivative.
 fn evaluate_separable<T: Real, const NY: usize>(
     [weights, delta]: [&[T; NY]; 2],
     r: &[T],
@@ -142,7 +142,7 @@ fn evaluate_separable<T: Real, const NY: usize>(
     sum
 }
 
-/// Whether weights and `δ` make sense.
+/// Checks that weights are nonnegative and `δ` positive.
 fn check_constants<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
     let invalid = |output, value, allowed| Err(InvalidConstant { output, value, allowed });
     for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
@@ -188,19 +188,20 @@ impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
     }
 }
 
-/// `φ(y − r)` of the outputs `y(x, z, u, p, t)` of a function, a reference `r`, which every stage
-/// has for itself, and a convex function `φ`: [`Huber`], [`PseudoHuber`], or your own [`Convex`].
+/// `φ(y − r)`: a convex function `φ` of the outputs `y(x, z, u, p, t)` of a function minus the
+/// reference `r` of the stage. `φ` is [`Huber`], [`PseudoHuber`], or a user-defined [`Convex`].
 ///
-/// Its Hessian is `Jᵀ ∇²φ J`, the generalised one of Gauss and Newton, which is positive
-/// semidefinite; the exact one has `Σ_i ∂φ/∂r_i ∇²y_i` too. Of `φ = ½ ‖·‖²` it is
-/// [`LeastSquaresCost`](crate::ocp::LeastSquaresCost). References are zero where none are set.
+/// Its Hessian is the generalised Gauss-Newton matrix `Jᵀ ∇²φ J`, which is positive semidefinite;
+/// the exact Hessian adds `Σ_i ∂φ/∂r_i ∇²y_i`. [`LeastSquaresCost`](crate::ocp::LeastSquaresCost)
+/// is the case `φ = ½ ‖·‖²`. References are zero by default.
 ///
 /// N. N. Schraudolph, "Fast curvature matrix-vector products for second-order gradient descent",
 /// Neural Comput. 14 (2002); F. Messerer, K. Baumgärtner, M. Diehl, "Survey of sequential convex
 /// programming and generalized Gauss-Newton methods", ESAIM: Proc. Surv. 71 (2021).
 ///
 /// # Example
-/// Of the data 0, 0.2, 0.4 and 10 the last one pulls with `δ = 1` alone: `3 x = 0.6 + 1`.
+/// For the data 0, 0.2, 0.4 and 10 the outlier contributes only `δ = 1` to the gradient:
+/// `3 x = 0.6 + 1`.
 /// ```
 /// use casados::ocp::{ConvexCost, HeapSqp, Horizon, Huber, Map, Problem};
 /// use casados::prelude::*;
@@ -232,7 +233,7 @@ pub struct ConvexCost<F: Function, C, T: Plain = f64> {
     /// `φ`, whose constants may be changed.
     pub outer: C,
     y: ArrayY<F, T>,
-    /// `∂φ/∂r`, and `∂²φ/∂r²`.
+    /// `∂φ/∂r` and `∂²φ/∂r²`.
     mu: ArrayY<F, T>,
     phi: MatrixYY<F, T>,
     jacobian: F::Jacobian<T>,
@@ -258,8 +259,8 @@ impl<F: Function, C: core::fmt::Debug, T: Plain> core::fmt::Debug for ConvexCost
 }
 
 impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
-    /// The cost of a convex function. Constants that make no sense are refused by `Problem::on` and
-    /// by every linearisation: [`OcpError::InvalidWeight`].
+    /// The cost of a convex function. `Problem::on` and every linearisation reject invalid
+    /// constants: [`OcpError::InvalidWeight`].
     #[must_use]
     pub fn new(outer: C) -> Self {
         let mut cost = Self {
@@ -274,7 +275,7 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
         cost
     }
 
-    /// `φ` and its derivatives at the outputs.
+    /// Evaluates `φ` and its derivatives at the outputs.
     fn evaluate(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
         let Self { outer, y, mu, phi, .. } = self;
         for (y, &r) in y.as_mut().iter_mut().zip(reference) {
@@ -340,7 +341,7 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         let value = self.evaluate(reference, at.stage)?;
         let Self { mu, phi, jacobian, hessian, .. } = self;
-        // From a point `v` on the gradient is `Jᵀ (φ′ − φ″ J v)`.
+        // Relative to a point `v` the gradient is `Jᵀ (φ′ − φ″ J v)`.
         let y = &Zeroable::zeroed();
         GaussNewtonTerms::<F, T> { weights: phi, y, jacobian, context: at, terms: &mut *terms }
             .add_coupled(mu);

@@ -12,8 +12,8 @@ use crate::shape::{Array, Plain, Shape, plain};
 use bytemuck::Zeroable;
 use core::fmt;
 
-/// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their
-/// sum.
+/// A cost at a node, as a function of `(x, z, u, p, t)`. `()` is no cost, a pair is the sum of
+/// both.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -44,26 +44,26 @@ use core::fmt;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Cost<S: Shape, T: Real> {
-    /// How many numbers a reference has.
+    /// The number of elements of a reference.
     const REFERENCES: usize;
-    /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is
-    /// not asked for.
+    /// Whether the Hessian that [`Cost::add_derivatives`] adds is positive semidefinite if the
+    /// exact one is not requested.
     const CONVEX: bool;
-    /// Whether it is known to be a convex function of the variables: one of outputs that are
+    /// Whether it is known to be a convex function of the variables, because its outputs are
     /// linear.
     #[doc(hidden)]
     const CONVEX_IN_VARIABLES: bool = false;
     /// Whether it depends on algebraic states.
     const ALGEBRAIC: bool;
 
-    /// Whether it depends on what is there only, and has weights that make sense.
+    /// Checks that it depends on available variables only, and that its weights are valid.
     ///
     /// # Errors
     /// [`OcpError::NotThere`], [`OcpError::InvalidWeight`]
     #[doc(hidden)]
     fn check(&self, there: AvailableVariables) -> Result<(), OcpError>;
 
-    /// Whether its weights, which may be changed after it was checked, make sense.
+    /// Checks its weights, which may have changed since [`Cost::check`].
     ///
     /// # Errors
     /// [`OcpError::InvalidWeight`]
@@ -72,34 +72,35 @@ pub trait Cost<S: Shape, T: Real> {
         Ok(())
     }
 
-    /// The function of an element of the reference, and which of its outputs it is.
+    /// Returns the function and the output of an element of the reference.
     #[doc(hidden)]
     fn name(reference: usize) -> (&'static str, usize) {
         ("", reference)
     }
 
-    /// Shows its terms as mathematics.
+    /// Prints its terms as formulas.
     ///
     /// # Errors
-    /// Those of what shows them.
+    /// The errors of `show`.
     #[doc(hidden)]
     fn terms(&self, show: TermWriter<'_>) -> fmt::Result;
 
-    /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
+    /// Visits the structural entries of the exact Hessian over `(x, u, z)`; returns false if these
+    /// are unknown.
     #[doc(hidden)]
     fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
         let _ = visit;
         false
     }
 
-    /// The value at a point.
+    /// Returns the value at a point.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
     fn value(&mut self, v: &S::ArrayV<T>, reference: &[T], stage: usize) -> Result<T, OcpError>;
 
-    /// The value at a point times a factor; adds gradient and Hessian times this factor.
+    /// Returns the value at a point times the factor; adds gradient and Hessian times the factor.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -112,8 +113,8 @@ pub trait Cost<S: Shape, T: Real> {
         terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError>;
 
-    /// Adds what parameters change of the gradient, and gradient and Hessian with respect to the
-    /// parameters themselves, times the factor.
+    /// Adds the derivatives of the gradient by the parameters, and gradient and Hessian with
+    /// respect to the parameters, times the factor.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -126,8 +127,8 @@ pub trait Cost<S: Shape, T: Real> {
         cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError>;
 
-    /// Adds what the reference changes, times the factor: of the value at a point, or, of a
-    /// direction over its variables, of the slope of the value along this direction.
+    /// Adds the derivative by the reference, times the factor: of the value at a point, or, if a
+    /// direction is given, of the directional derivative of the value.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -144,17 +145,17 @@ pub trait Cost<S: Shape, T: Real> {
     }
 }
 
-/// What takes terms of an objective.
+/// Receives the terms of an objective.
 pub type TermWriter<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
 
-/// Where, how much, and whether the Hessian is to be exact.
+/// The stage, the factor and the kind of Hessian.
 #[derive(Clone, Copy, Debug)]
 pub struct CostContext<'a, T> {
     pub(in crate::ocp) stage: usize,
     pub(in crate::ocp) factor: T,
     pub(in crate::ocp) exact: bool,
-    /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with
-    /// the Hessian `H` that is added, which is [convex](Cost::CONVEX). Else it is empty.
+    /// `(x, u)` if the gradient is that of the quadratic model at zero, `∇f − H (x, u)` with the
+    /// added [convex](Cost::CONVEX) Hessian `H`; otherwise empty.
     pub(in crate::ocp) model_origin: &'a [T],
 }
 
@@ -195,7 +196,7 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     }
 }
 
-/// References lie one after the other.
+/// The reference of `A` is followed by that of `B`.
 impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     const REFERENCES: usize = A::REFERENCES + B::REFERENCES;
     const CONVEX: bool = A::CONVEX && B::CONVEX;
@@ -264,7 +265,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
 
 /// The sum of all outputs `y(x, z, u, p, t)` of a function, with its exact Hessian.
 ///
-/// If that is not positive semidefinite, the stages are made convex.
+/// If the Hessian is not positive semidefinite, the stages are convexified.
 ///
 /// ```
 /// use casados::ocp::{GeneralCost, Horizon, Problem};

@@ -1,4 +1,4 @@
-//! What happens between two nodes of a horizon.
+//! Dynamics: the map from one node of a horizon to the next.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParametersView;
@@ -11,7 +11,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use core::fmt;
 
-/// What is given of one interval.
+/// The data of one interval.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Interval<'a, T> {
@@ -19,15 +19,15 @@ pub struct Interval<'a, T> {
     pub x: &'a [T],
     /// The control, constant over the interval.
     pub u: &'a [T],
-    /// The parameters that were set.
+    /// The set parameters.
     pub(in crate::ocp) p: &'a [T],
-    /// The free ones, and where they are.
+    /// The free parameters and their positions.
     pub(in crate::ocp) w: &'a [T],
     pub(in crate::ocp) free: FreeParametersView<'a>,
-    /// The multipliers `π` of its end.
+    /// The multipliers `π` of the state at its end.
     pub multipliers: &'a [T],
-    /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if
-    /// nothing depends on these.
+    /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if no
+    /// function depends on algebraic states.
     pub nu: &'a [T],
     /// The time at its start.
     pub t: T,
@@ -36,7 +36,7 @@ pub struct Interval<'a, T> {
 }
 
 impl<T: Real> Interval<'_, T> {
-    /// The parameters.
+    /// Returns the parameters, with free ones in their places.
     #[inline(always)]
     pub(in crate::ocp) fn parameters<V: Matrix<T>>(&self) -> V {
         let mut p: V = vector(self.p);
@@ -57,29 +57,29 @@ pub struct Nodes<'a, T> {
     pub(in crate::ocp) times: &'a [T],
     /// `NX`, `NU`, `NP`, `NZ`
     pub(in crate::ocp) dims: [usize; 4],
-    /// Distances of stages in `v`, and in `multipliers`.
+    /// The strides of stages in `v` and in `multipliers`.
     pub(in crate::ocp) ld: [usize; 2],
-    /// The part of the last step after which they are, of a solver that knows
-    /// [stages](Dynamics::LIFTED): these have their memory on the heap.
+    /// The step length of the last step, from solvers that treat [stages](Dynamics::LIFTED) as
+    /// variables, which have their memory on the heap.
     #[cfg_attr(not(feature = "alloc"), allow(dead_code))]
     pub(in crate::ocp) step_length: Option<T>,
-    /// Where in every interval a piece of it begins and ends, if it is not the whole: as parts of
-    /// the interval.
+    /// The start and the end of the current piece of every interval, as fractions of the interval;
+    /// none for whole intervals.
     pub(in crate::ocp) piece: Option<[T; 2]>,
 }
 
 impl<'a, T: Real> Nodes<'a, T> {
-    /// How many intervals.
+    /// Returns the number of intervals.
     #[must_use]
     pub fn len(&self) -> usize {
         self.times.len().saturating_sub(1)
     }
-    /// Whether there is none.
+    /// Returns whether there is no interval.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// All intervals, in order.
+    /// Returns all intervals, in order.
     pub fn iter(&self) -> impl Iterator<Item = Interval<'a, T>> + use<'a, T> {
         let Self {
             v,
@@ -116,29 +116,29 @@ impl<'a, T: Real> Nodes<'a, T> {
     }
 }
 
-/// What happens to stages that are variables.
+/// An action on stages that are variables.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageAction<T> {
-    /// They go a part of their step.
+    /// Takes this fraction of their step.
     Step(T),
-    /// They are those of the best iterate.
+    /// Stores them as the stages of the best iterate.
     StoreBest,
-    /// They are what they were at the best iterate.
+    /// Restores the stages of the best iterate.
     RestoreBest,
 }
 
-/// What takes the results of the intervals, in order.
+/// Receives the results of the intervals, in order.
 #[doc(hidden)]
 pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &IntervalResult<'_, T>);
 
-/// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
+/// The dynamics between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
 ///
-/// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or
-/// on the heap, and those that wrap them ([`Projected`](crate::Projected),
-/// [`Divided`](crate::Divided)); [`WithIntegral`](crate::ocp::WithIntegral) is one with an integral
-/// cost, [`Map`](crate::ocp::Map) a function that is `φ` itself, `Shooting` a batch that takes all
-/// intervals at once, and `ReturnMap` dynamics whose last interval ends with a map.
+/// Dynamics are: integrators of single intervals, implicit or explicit, with memory inline or on
+/// the heap, also wrapped ([`Projected`](crate::Projected), [`Divided`](crate::Divided));
+/// [`WithIntegral`](crate::ocp::WithIntegral), an integrator with an integral cost;
+/// [`Map`](crate::ocp::Map), a function that is `φ` itself; `Shooting`, a batch that integrates all
+/// intervals at once; and `ReturnMap`, dynamics whose last interval ends with a map.
 ///
 /// ```
 /// use casados::ocp::{Dynamics, Horizon, HeapOcp, Formulation, OcpError, Problem};
@@ -165,22 +165,22 @@ pub trait Dynamics<T: Real> {
     type Shape: Shape;
     /// Names of the variables.
     const NAMES: Names;
-    /// Whether [`IntervalResult::z`] says what the algebraic states are at nodes.
+    /// Whether [`IntervalResult::z`] has the algebraic states at nodes.
     const ALGEBRAIC: bool = false;
-    /// Whether the end of an interval is that of the equations of a model.
+    /// Whether `φ` is the flow of a differential equation.
     #[doc(hidden)]
     const IS_FLOW: bool = true;
     /// Whether there are integral costs.
     #[doc(hidden)]
     const INTEGRAL: bool = false;
-    /// What the ends of intervals follow from.
+    /// The functions that determine the sparsity of `φ`.
     #[doc(hidden)]
     const STRUCTURE: DynamicsStructure = DynamicsStructure::Unknown;
-    /// Whether stages of intervals are variables, which a solver moves with its iterate: by
+    /// Whether stages of intervals are variables, which a solver updates with its iterate by
     /// `initialise_stages`, `expand_stage_steps` and `apply_stage_action`.
     const LIFTED: bool = false;
 
-    /// Whether weights of integral costs make sense.
+    /// Checks the weights of integral costs.
     ///
     /// # Errors
     /// [`OcpError::InvalidWeight`]
@@ -188,44 +188,45 @@ pub trait Dynamics<T: Real> {
         Ok(())
     }
 
-    /// Whether intervals may be integrated in pieces, one after the other.
+    /// Returns whether intervals may be integrated in pieces, one after the other.
     #[doc(hidden)]
     fn has_pieces(&self) -> bool {
         Self::IS_FLOW && !Self::LIFTED
     }
 
-    /// Shows integral costs as mathematics.
+    /// Prints integral costs as formulas.
     ///
     /// # Errors
-    /// Those of what shows them.
+    /// The errors of `show`.
     #[doc(hidden)]
     fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         let _ = show;
         Ok(())
     }
 
-    /// From now on stages of intervals are remembered, if that saves anything. With `solved` the
-    /// following calls are at the point of the last one, which was successful. Whether they are.
+    /// Enables storing the stages of intervals, where that saves work. If `solved`, the following
+    /// calls are at the point of the last call, which was successful. Returns whether stages are
+    /// stored.
     #[doc(hidden)]
     fn keep_stages(&mut self, solved: bool) -> bool {
         let _ = solved;
         false
     }
 
-    /// The ends of all intervals, and integral costs.
+    /// Evaluates the ends of all intervals, and integral costs.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
 
-    /// The ends of all intervals and their first derivatives.
+    /// Evaluates the ends of all intervals and their first derivatives.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
 
-    /// States and algebraic states at these parts of every interval, of all of one after those of
-    /// the other. Whether there are any: of maps there are none.
+    /// Evaluates states and algebraic states at these fractions of every interval, interval by
+    /// interval. Returns false for maps, which have none.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
@@ -236,7 +237,7 @@ pub trait Dynamics<T: Real> {
         Ok(false)
     }
 
-    /// Stages begin anew, at a guess.
+    /// Initialises stages at a guess.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -244,8 +245,7 @@ pub trait Dynamics<T: Real> {
         Ok(())
     }
 
-    /// The step of stages that belongs to one of states and controls, as it was linearised at these
-    /// nodes.
+    /// Expands a step of states and controls to the stages, with the linearisation at these nodes.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
@@ -253,14 +253,14 @@ pub trait Dynamics<T: Real> {
         Ok(())
     }
 
-    /// What happens to stages.
+    /// Applies an action to the stages.
     fn apply_stage_action(&mut self, _action: StageAction<T>) {}
 }
 
 /// Dynamics with second derivatives.
 ///
-/// Users write it in bounds, or [`ExactFormulation`](crate::ocp::ExactFormulation) of a whole
-/// problem.
+/// Generic functions require it in bounds, or [`ExactFormulation`](crate::ocp::ExactFormulation) of
+/// a whole problem.
 ///
 /// ```
 /// use casados::ocp::{HeapIpm, Horizon, OcpError, Problem, SecondOrder};
@@ -285,15 +285,15 @@ pub trait Dynamics<T: Real> {
     note = "sequential quadratic programming needs none after `Sqp::gauss_newton`"
 )]
 pub trait SecondOrder<T: Real>: Dynamics<T> {
-    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)` with the
-    /// multipliers `π` and the weights `ν` of the [`Interval`].
+    /// Evaluates the ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)`
+    /// with the multipliers `π` and the weights `ν` of the [`Interval`].
     ///
     /// # Errors
     /// [`OcpError::Integration`]
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
 }
 
-/// Sum and largest of what is left of the equations of stages.
+/// Returns the sum and the maximum of two pairs of stage residuals.
 pub(in crate::ocp) fn add_stage_residuals<T: Real>(
     [sum, largest]: [T; 2],
     [other_sum, other_largest]: [T; 2],
@@ -301,7 +301,7 @@ pub(in crate::ocp) fn add_stage_residuals<T: Real>(
     [sum + other_sum, nan_max(largest, other_largest)]
 }
 
-/// A vector of these elements.
+/// Returns a vector with these elements.
 pub(in crate::ocp) fn vector<T: Plain, V: Matrix<T>>(elements: &[T]) -> V {
     let mut vector = V::zeroed();
     for (to, from) in vector.as_mut_slice().iter_mut().zip(elements) {

@@ -15,11 +15,11 @@ use bytemuck::Zeroable;
 use core::fmt;
 use core::ops::Range;
 
-/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`,
-/// which every stage has for itself.
+/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and the reference `r` of
+/// the stage.
 ///
-/// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y`
-/// too.
+/// Its Hessian is the Gauss-Newton matrix `JᵀWJ`; the exact Hessian adds the second derivatives of
+/// `y`.
 ///
 /// ```
 /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
@@ -45,9 +45,9 @@ use core::ops::Range;
 #[zeroable(bound = "")]
 pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
     weights: MatrixYY<F, T>,
-    /// Zero if they are weights.
+    /// Nonzero if `W` is not symmetric and positive semidefinite.
     has_invalid_weights: usize,
-    /// Zero if `W` is diagonal.
+    /// Nonzero if `W` is not diagonal.
     has_full_weights: usize,
     y: ArrayY<F, T>,
     mu: ArrayY<F, T>,
@@ -58,9 +58,9 @@ pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
 plain!([F: Function, T: Plain] LeastSquaresCost<F, T> { weights, has_invalid_weights, has_full_weights, y, mu, jacobian, hessian });
 
 impl<F: Function, T: Real> LeastSquaresCost<F, T> {
-    /// With the weights `W`, a symmetric, positive semidefinite matrix.
+    /// The cost with the weights `W`, a symmetric, positive semidefinite matrix.
     ///
-    /// Others are refused by `Problem::on` and by every linearisation: [`OcpError::InvalidWeight`].
+    /// `Problem::on` and every linearisation reject other weights: [`OcpError::InvalidWeight`].
     #[must_use]
     pub fn new(weights: &MatrixYY<F, T>) -> Self {
         let mut cost: Self = Zeroable::zeroed();
@@ -69,7 +69,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         cost
     }
 
-    /// With a weight for each output, from zero on.
+    /// The cost with a nonnegative weight for each output.
     #[must_use]
     pub fn diagonal(weights: &ArrayY<F, T>) -> Self {
         let mut matrix: MatrixYY<F, T> = Zeroable::zeroed();
@@ -79,7 +79,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         Self::new(&matrix)
     }
 
-    /// Other weights, as those of [`LeastSquaresCost::new`].
+    /// Changes the weights, as in [`LeastSquaresCost::new`].
     pub fn set_weights(&mut self, weights: &MatrixYY<F, T>) {
         let elements = || (0..F::Outputs::NY).flat_map(|i| (0..i).map(move |j| (i, j)));
         self.has_full_weights =
@@ -89,7 +89,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
             usize::from(weights::check::<F, T>(weights, self.has_full_weights != 0).is_err());
     }
 
-    /// `μ = W (y − r)`, and `½ (y − r)ᵀ μ`.
+    /// Computes `μ = W (y − r)`, and returns `½ (y − r)ᵀ μ`.
     #[inline(always)]
     fn weighted_square(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
         let Self { weights, has_full_weights: coupled, y, mu, .. } = self;
@@ -103,7 +103,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
     }
 }
 
-/// `μ = W y`
+/// Computes `μ = W y`.
 #[inline(always)]
 fn apply_weights<F: Function, T: Real>(
     weights: &MatrixYY<F, T>,
@@ -121,8 +121,8 @@ fn apply_weights<F: Function, T: Real>(
     }
 }
 
-/// Subtracts `φ′`, or of a direction `d` `φ″ J d`, times a factor: what the reference changes of
-/// `φ(y − r)`.
+/// Subtracts `φ′`, or for a direction `d` `φ″ J d`, times a factor: the negative derivative of
+/// `φ(y − r)` by `r`.
 pub(in crate::ocp) fn subtract_reference_derivatives<F: Function, T: Real>(
     (second, first): (&MatrixYY<F, T>, &ArrayY<F, T>),
     (jacobian, direction): (&F::Jacobian<T>, Option<&ArrayV<F, T>>),
@@ -239,8 +239,8 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
     }
 }
 
-/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or
-/// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
+/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; relative to a point `v` the gradient is
+/// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)`.
 pub(in crate::ocp) struct GaussNewtonTerms<'a, 'b, F: Function, T: Plain> {
     pub weights: &'a MatrixYY<F, T>,
     /// `y − r`
@@ -251,14 +251,14 @@ pub(in crate::ocp) struct GaussNewtonTerms<'a, 'b, F: Function, T: Plain> {
 }
 
 impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
-    /// Where the entries of an output begin and end.
+    /// Returns the range of the entries of an output.
     #[inline(always)]
     fn entry_range(output: usize) -> Range<usize> {
         let begin = |output: usize| F::STRUCTURE.begins.get(output).map_or(0, |&begin| begin as usize);
         begin(output)..begin(output + 1)
     }
 
-    /// One of them, as a position in `(x, w, u, z)` and a value.
+    /// Returns an entry, as a position in `(x, w, u, z)` and a value.
     #[inline(always)]
     fn entry(&self, place: usize) -> Option<(usize, T)> {
         let entry = *F::STRUCTURE.by_row.get(place)? as usize;
@@ -266,14 +266,14 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
         Some((self.terms.free.position::<F::Shape>(variable)?, *self.jacobian.as_ref().get(entry)?))
     }
 
-    /// The weight of two outputs, without a place for a panic.
+    /// Returns the weight of two outputs, without a panic branch.
     #[inline(always)]
     fn weight(&self, k: usize, l: usize) -> T {
         let weight = self.weights.as_slice().get(l * F::Outputs::NY + k);
         self.context.factor * weight.copied().unwrap_or(T::ZERO)
     }
 
-    /// `y − r`, or `y − r − J v`, of an output.
+    /// Returns `y − r`, or `y − r − J v`, of an output.
     #[inline(always)]
     fn shifted_residual(&self, output: usize) -> T {
         let mut y = self.y.as_ref().get(output).copied().unwrap_or(T::ZERO);
@@ -287,7 +287,7 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
         y
     }
 
-    /// Adds what two outputs do to the Hessian.
+    /// Adds the Hessian term of two outputs.
     #[inline(always)]
     fn add_output_hessian(&mut self, weight: T, [k, l]: [usize; 2]) {
         for a in Self::entry_range(k) {
@@ -301,7 +301,7 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
         }
     }
 
-    /// Adds what an output does to the gradient.
+    /// Adds the gradient term of an output.
     #[inline(always)]
     fn add_output_gradient(&mut self, slope: T, output: usize) {
         for place in Self::entry_range(output) {
@@ -311,13 +311,13 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
         }
     }
 
-    /// Whether the outputs depend on free parameters.
+    /// Returns whether the outputs depend on free parameters.
     #[inline(always)]
     fn depends_on_free_parameters(&self) -> bool {
         F::STRUCTURE.blocks[4] < F::STRUCTURE.blocks[5] && self.terms.free.count() > 0
     }
 
-    /// As [`Square::coupled`], over free parameters too.
+    /// As [`GaussNewtonTerms::add_coupled`], over free parameters too.
     fn add_with_free_parameters(&mut self, mu: &ArrayY<F, T>) {
         let (free, jacobian, from) = (self.terms.free, self.jacobian.as_ref(), self.context.model_origin);
         let entries = || {
@@ -346,7 +346,7 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
         }
     }
 
-    /// With weights between outputs, and `Jᵀ μ` too.
+    /// Adds the terms with full weights, and `Jᵀ μ`.
     pub fn add_coupled(&mut self, mu: &ArrayY<F, T>) {
         if self.depends_on_free_parameters() {
             return self.add_with_free_parameters(mu);
@@ -366,7 +366,7 @@ impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
     }
 }
 
-/// With a weight for each output.
+/// Adds the terms with diagonal weights.
 impl<F: Function, T: Real> Kernel for GaussNewtonTerms<'_, '_, F, T> {
     type Number = T;
     type Output = ();

@@ -1,4 +1,4 @@
-//! Functions at a node: what they are evaluated at, and where their derivatives go.
+//! Evaluation of functions at a node: their arguments, and the targets of their derivatives.
 
 use crate::function::{ArrayV, ArrayY, Function, FunctionStructure, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
@@ -6,13 +6,13 @@ use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// The index of a parameter among the variables.
+/// Returns the index of a parameter among the variables.
 #[inline(always)]
 pub(in crate::ocp) fn parameter_index<S: Shape>(variable: usize) -> Option<usize> {
     variable.checked_sub(2 * S::NX + S::NZ + S::NU).filter(|&p| p < S::NP)
 }
 
-/// Whether a function depends on algebraic states.
+/// Returns whether a function depends on algebraic states.
 pub(in crate::ocp) const fn depends_on_algebraic<F: Function>() -> bool {
     F::STRUCTURE.blocks[2] < F::STRUCTURE.blocks[3]
 }
@@ -35,7 +35,7 @@ pub(in crate::ocp) fn write_variables<S: Shape, T: Real>(
     }
 }
 
-/// Whether all outputs of a function are finite.
+/// Checks that all outputs of a function are finite.
 ///
 /// # Errors
 /// [`OcpError::NonFiniteFunction`]
@@ -45,13 +45,17 @@ pub(in crate::ocp) fn check_finite_outputs<F: Function, T: Real>(
 ) -> Result<(), OcpError> {
     match crate::finite::find_non_finite(y.as_ref()) {
         None => Ok(()),
-        Some((output, value)) => {
-            Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
-        }
+        Some((output, value)) => Err(OcpError::NonFiniteFunction {
+            function: F::STRUCTURE.name,
+            stage,
+            output,
+            value,
+            phase: None,
+        }),
     }
 }
 
-/// A value that follows from the outputs of a function, if it is finite.
+/// Returns a value computed from the outputs of a function, if it is finite.
 ///
 /// # Errors
 /// [`OcpError::NonFiniteFunction`]
@@ -64,24 +68,24 @@ pub(in crate::ocp) fn check_finite_value<F: Function, T: Real>(
         return Ok(value);
     }
     let (output, value) = crate::finite::find_non_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
-    Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+    Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value, phase: None })
 }
 
-/// What is there where a function is evaluated.
+/// The variables that are available at a node.
 #[derive(Clone, Copy, Debug)]
 pub struct AvailableVariables {
     /// Algebraic states.
     pub(in crate::ocp) z: bool,
-    /// Controls: not at the end of the horizon.
+    /// Controls: available except at the end of the horizon.
     pub(in crate::ocp) u: bool,
-    /// The first stage of these.
+    /// The first stage with these variables.
     pub(in crate::ocp) stage: usize,
-    /// A time that has no derivatives: not where the end of the horizon is free.
+    /// The time: available unless the end time is free.
     pub(in crate::ocp) t: bool,
 }
 
 impl AvailableVariables {
-    /// Whether a function depends on this only.
+    /// Checks that a function depends on available variables only.
     pub(in crate::ocp) fn check<F: Function>(self) -> Result<(), OcpError> {
         let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
         if F::IS_TIMED && !self.t {
@@ -105,14 +109,14 @@ impl AvailableVariables {
     }
 }
 
-/// A gradient and the lower triangle of a Hessian over `(x, w, u)`, or `(x, w, u, z)`, to be added
-/// to.
+/// A gradient and the lower triangle of a Hessian over `(x, w, u)`, or `(x, w, u, z)`, as
+/// accumulators.
 pub struct QuadraticTerms<'a, T> {
-    /// Where variables are.
+    /// The positions of the free parameters.
     pub(in crate::ocp) free: FreeParametersView<'a>,
     pub(in crate::ocp) gradient: &'a mut [T],
     pub(in crate::ocp) hessian: &'a mut [T],
-    /// The distance of columns.
+    /// The stride of columns.
     pub(in crate::ocp) ld: usize,
 }
 
@@ -131,7 +135,7 @@ impl<T: Real> QuadraticTerms<'_, T> {
             *element = *element + value;
         }
     }
-    /// Adds `factor ∇²(μᵀy)` of the outputs of a function, whose entries are computed in `hessian`.
+    /// Adds `factor ∇²(μᵀy)` of the outputs of a function; `hessian` is the memory of its entries.
     #[inline(always)]
     pub(in crate::ocp) fn add_weighted_hessian<F: Function>(
         &mut self,
@@ -144,7 +148,7 @@ impl<T: Real> QuadraticTerms<'_, T> {
         for_each_hessian_entry::<F, T>(v, mu, hessian, |row, column, value| {
             let places = [row, column].map(|variable| free.position::<F::Shape>(variable));
             if let [Some(row), Some(column)] = places {
-                // Controls come before algebraic states here, and behind them in a model.
+                // Controls precede algebraic states here, and follow them in a model.
                 let swap = row < column;
                 let (row, column) = if swap { (column, row) } else { (row, column) };
                 self.add_hessian(row, column, factor * value);
@@ -154,9 +158,9 @@ impl<T: Real> QuadraticTerms<'_, T> {
 }
 
 impl<T: Real> QuadraticTerms<'_, T> {
-    /// Adds what a duration `T`, the variable `place`, does to a cost `T l` beside what `l` does by
-    /// it: `l` to the gradient, `∇l` to its row and its column of an exact Hessian. The gradient
-    /// was `before`, and `∇(T l)` with `T` constant was added.
+    /// Adds the derivatives of a cost `T l` by the duration `T`, the variable `duration_index`,
+    /// beyond those of `l`: `l` to the gradient, `∇l` to its row and column of an exact Hessian.
+    /// `gradient_before` is the gradient before `∇(T l)` at constant `T` was added.
     pub(in crate::ocp) fn add_duration_derivatives(
         &mut self,
         duration_index: usize,
@@ -175,8 +179,8 @@ impl<T: Real> QuadraticTerms<'_, T> {
     }
 }
 
-/// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in
-/// `hessian`.
+/// Visits the entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value;
+/// `hessian` is their memory.
 #[inline(always)]
 pub(in crate::ocp) fn for_each_hessian_entry<F: Function, T: Real>(
     v: &ArrayV<F, T>,
@@ -195,17 +199,17 @@ pub(in crate::ocp) fn for_each_hessian_entry<F: Function, T: Real>(
     }
 }
 
-/// Derivatives with respect to parameters, to be added to.
+/// Derivatives with respect to parameters, as accumulators.
 pub struct ParameterDerivatives<'a, T> {
-    /// Where variables are.
+    /// The positions of the free parameters.
     pub(in crate::ocp) free: FreeParametersView<'a>,
-    /// Of a gradient over `(x, u)`, or `(x, u, z)`: a column for each parameter.
+    /// Derivatives of a gradient over `(x, u)`, or `(x, u, z)`: a column for each parameter.
     pub(in crate::ocp) mixed_columns: &'a mut [T],
-    /// The distance of columns.
+    /// The stride of columns.
     pub(in crate::ocp) ld: usize,
-    /// The gradient with respect to the parameters themselves.
+    /// The gradient with respect to the parameters.
     pub(in crate::ocp) gradient: &'a mut [T],
-    /// The Hessian with respect to these, both triangles.
+    /// The Hessian with respect to the parameters, both triangles.
     pub(in crate::ocp) hessian: &'a mut [T],
 }
 
@@ -222,14 +226,14 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             *element = *element + value;
         }
     }
-    /// Adds to the Hessian with respect to parameters, at this place alone.
+    /// Adds to one element of the Hessian with respect to parameters.
     pub(in crate::ocp) fn add_hessian(&mut self, p: usize, q: usize, value: T) {
         if let Some(element) = self.hessian.get_mut(q * self.gradient.len() + p) {
             *element = *element + value;
         }
     }
-    /// Adds what parameters change of `factor ∇(μᵀy)` of the outputs of a function; entries of its
-    /// Hessian are computed in `hessian`.
+    /// Adds the derivatives by parameters of `factor ∇(μᵀy)` of the outputs of a function;
+    /// `hessian` is the memory of the entries of its Hessian.
     pub(in crate::ocp) fn add_weighted_hessian<F: Function>(
         &mut self,
         v: &ArrayV<F, T>,
@@ -238,7 +242,7 @@ impl<T: Real> ParameterDerivatives<'_, T> {
         hessian: &mut F::Hessian<T>,
     ) {
         for_each_hessian_entry::<F, T>(v, mu, hessian, |row, column, value| {
-            // Parameters come after states and controls: they are rows of the lower triangle.
+            // Parameters follow states and controls: they are rows of the lower triangle.
             let Some(p) = parameter_index::<F::Shape>(row) else { return };
             if let Some(position) = self.free.position::<F::Shape>(column) {
                 self.add_mixed(position, p, factor * value);
@@ -250,8 +254,8 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             }
         });
     }
-    /// Adds what parameters change of the gradient of `factor φ(y)` by first derivatives of the
-    /// outputs of a function: `∇φ` is `mu`, its matrix `∇²φ` is `outer`.
+    /// Adds the Gauss-Newton part of the derivatives by parameters of the gradient of
+    /// `factor φ(y)`, where `mu = ∇φ` and `outer = ∇²φ`.
     pub(in crate::ocp) fn gauss_newton<F: Function>(
         &mut self,
         jacobian: &F::Jacobian<T>,
@@ -273,7 +277,7 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             }
         }
     }
-    /// Adds matrices `xp`, `up` and `pp`, column after column.
+    /// Adds the blocks `xp`, `up` and `pp`, column after column.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up, pp]: [&[T]; 3]) {
         for (to, &value) in self.hessian.iter_mut().zip(pp) {
@@ -287,7 +291,8 @@ impl<T: Real> ParameterDerivatives<'_, T> {
     }
 }
 
-/// Adds blocks `xx`, `xu`, `uu` and `xp`, `up`, `pp`, column after column, to the lower triangle.
+/// Adds the blocks `xx`, `xu`, `uu` and `xp`, `up`, `pp`, column after column, to the lower
+/// triangle.
 pub(in crate::ocp) fn add_blocks<T: Real>(
     terms: &mut QuadraticTerms<'_, T>,
     nx: usize,
@@ -319,7 +324,7 @@ pub(in crate::ocp) fn add_blocks<T: Real>(
     }
 }
 
-/// Adds those of free parameters.
+/// Adds the blocks of free parameters.
 fn add_parameter_blocks<T: Real>(
     terms: &mut QuadraticTerms<'_, T>,
     [nx, nu]: [usize; 2],

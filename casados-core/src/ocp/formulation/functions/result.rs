@@ -1,12 +1,12 @@
-//! What comes out of an interval.
+//! The results of an interval.
 
 use crate::model::Dae;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
 
-/// What comes out of an interval: matrices as slices, column after column. What was not asked for
-/// is empty.
+/// The results of an interval, with matrices as slices, column after column. Parts that were not
+/// requested are empty.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct IntervalResult<'a, T> {
@@ -24,12 +24,11 @@ pub struct IntervalResult<'a, T> {
     pub dp: &'a [T],
     /// `∇²(πᵀφ + νᵀζ + integral)`: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
-    /// The blocks `xp`, `up`, `pp` of the same.
+    /// The blocks `xp`, `up`, `pp` of the same Hessian.
     pub hessian_p: [&'a [T]; 3],
     /// The integral cost.
     pub cost: IntegralTerms<'a, T>,
-    /// The sum of what is left of the equations of stages, and the largest; zero where these are
-    /// solved.
+    /// The sum and the maximum of the residuals of stage equations; zero if these are solved.
     pub stage_residuals: [T; 2],
 }
 
@@ -88,7 +87,7 @@ pub struct IntegralTerms<'a, T> {
     pub u: &'a [T],
     /// Its gradient with respect to `p`.
     pub p: &'a [T],
-    /// The matrix of Gauss and Newton: blocks `xx`, `xu`, `uu`.
+    /// The Gauss-Newton matrix: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
     /// Its blocks `xp`, `up`, `pp`.
     pub hessian_p: [&'a [T]; 3],

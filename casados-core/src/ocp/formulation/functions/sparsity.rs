@@ -1,33 +1,34 @@
-//! Where derivatives of a problem may differ from zero: what the graphs of its functions know.
+//! Structural sparsity of the derivatives of a problem, from the expression graphs of its
+//! functions.
 
 use crate::function::Function;
 use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::structure::Pattern;
 
-/// An entry of derivatives over `(x, u, z)`.
+/// A structural entry of derivatives over `(x, u, z)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DerivativeEntry {
-    /// Of a Jacobian: output and variable.
+    /// An entry of a Jacobian: output and variable.
     Jacobian(usize, usize),
-    /// Of a Hessian: two variables, in one order or the other.
+    /// An entry of a Hessian: two variables, in either order.
     Hessian(usize, usize),
 }
 
-/// What takes entries.
+/// Receives structural entries.
 pub type EntryVisitor<'a> = &'a mut dyn FnMut(DerivativeEntry);
 
-/// What the ends of intervals follow from.
+/// The functions that determine the sparsity of `φ`.
 #[derive(Clone, Copy, Debug)]
 pub enum DynamicsStructure {
-    /// Nothing is known.
+    /// Unknown.
     Unknown,
-    /// The equations of a model: where these and their second derivatives have entries.
+    /// The equations of a model: the patterns of their first and second derivatives.
     Equations(Pattern, Pattern),
-    /// A function of `(x, z, u, p)`.
+    /// A function of `(x, z, u, p)`: the patterns of its first and second derivatives.
     Map(Pattern, Pattern),
 }
 
-/// The entries of the Jacobian of a function.
+/// Visits the entries of the Jacobian of a function.
 pub(in crate::ocp) fn visit_jacobian<F: Function>(visit: EntryVisitor<'_>) {
     for (row, variable) in F::STRUCTURE.jacobian.iter() {
         if let Some(position) = FreeParametersView::default().position::<F::Shape>(variable) {
@@ -36,7 +37,7 @@ pub(in crate::ocp) fn visit_jacobian<F: Function>(visit: EntryVisitor<'_>) {
     }
 }
 
-/// The entries of the Hessian of any sum of the outputs of a function.
+/// Visits the entries of the Hessian of a weighted sum of the outputs of a function.
 pub(in crate::ocp) fn visit_hessian<F: Function>(visit: EntryVisitor<'_>) {
     for (one, other) in F::STRUCTURE.hessian.iter() {
         if let (Some(one), Some(other)) = (
@@ -48,7 +49,7 @@ pub(in crate::ocp) fn visit_hessian<F: Function>(visit: EntryVisitor<'_>) {
     }
 }
 
-/// The entries of `JᵀWJ`, where weights couple different outputs or not.
+/// Visits the entries of `JᵀWJ`; `coupled` if `W` is not diagonal.
 pub(in crate::ocp) fn visit_gauss_newton<F: Function>(coupled: bool, visit: EntryVisitor<'_>) {
     let jacobian_entries = || F::STRUCTURE.jacobian.iter();
     for (k, one) in jacobian_entries() {

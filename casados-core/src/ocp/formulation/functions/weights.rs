@@ -1,11 +1,11 @@
-//! Whether the weights of least squares are those of a norm.
+//! Checks of least-squares weights.
 
 use crate::function::{Function, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
 use crate::scalar::Real;
 use crate::shape::Matrix;
 
-/// Whether the weights of a function's outputs are those of a norm.
+/// Checks that the weights of a function's outputs are symmetric and positive semidefinite.
 ///
 /// # Errors
 /// [`OcpError::InvalidWeight`]
@@ -23,17 +23,17 @@ pub(in crate::ocp) fn check<F: Function, T: Real>(
     )
 }
 
-/// A weight that is none, and what it has to be.
+/// An invalid weight and the requirement.
 pub(in crate::ocp) struct WeightError {
-    /// Its row and its column.
+    /// Its row and column.
     pub indices: [usize; 2],
     pub value: f64,
     pub allowed: &'static str,
 }
 
-/// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
-/// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for rows without weights.
-/// If none are `coupled`, there is the diagonal alone.
+/// Checks that weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units
+/// of its diagonal: the pivots of `W + δ diag(W)` must be positive, except in rows without weights.
+/// If the weights are not `coupled`, only the diagonal is used.
 pub(in crate::ocp) fn check_semidefinite<T: Real, V: Matrix<T>>(
     weights: &V,
     coupled: bool,
@@ -55,7 +55,7 @@ pub(in crate::ocp) fn check_semidefinite<T: Real, V: Matrix<T>>(
     for i in 0..ny {
         for j in 0..i {
             let difference = weight(i, j) - weight(j, i);
-            // The square of what the matrix may be off by there.
+            // The square of the allowed asymmetry.
             let allowed = tolerance * tolerance * weight(i, i) * weight(j, j);
             let is_symmetric = difference * difference <= allowed;
             if !is_symmetric {

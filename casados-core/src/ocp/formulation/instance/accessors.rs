@@ -1,4 +1,4 @@
-//! What there is of every problem: its QP and its iterate.
+//! Access to the QP and the iterate of a problem.
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::Ocp;
@@ -6,7 +6,7 @@ use crate::qp::{QpView, Solution, StageDims, marked_indices};
 use crate::scalar::Real;
 
 impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Finds out whether memory of a run has the dimensions of the problem.
+    /// Checks that the memory of a run has the dimensions of the problem.
     ///
     /// # Errors
     /// [`OcpError::Length`]
@@ -26,41 +26,40 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
         Ok(())
     }
 
-    /// How many intervals the horizon has.
+    /// Returns the number of intervals of the horizon.
     #[must_use]
     pub fn intervals(&self) -> usize {
         self.qp.dims().len().saturating_sub(1)
     }
 
-    /// The functions of the problem: weights of costs and options of integrators may be changed
-    /// there.
+    /// Returns the functions of the problem, to change weights of costs and options of integrators.
     pub fn problem(&mut self) -> &mut P {
         &mut self.problem
     }
 
-    /// The QP at the iterate of the last [`Ocp::linearise`].
+    /// Returns the QP at the iterate of the last [`Ocp::linearise`].
     #[must_use]
     pub fn qp(&self) -> QpView<'_, T> {
         self.qp.view()
     }
 
-    /// The QP, and the iterate as the place of its solution.
+    /// Returns the QP, and the iterate as the memory of its solution.
     pub fn qp_and_iterate(&mut self) -> (QpView<'_, T>, &mut Solution<T, D, M>) {
         (self.qp.view(), &mut self.iterate)
     }
 
-    /// States, controls and multipliers.
+    /// Returns states, controls and multipliers.
     #[must_use]
     pub fn iterate(&self) -> &Solution<T, D, M> {
         &self.iterate
     }
 
-    /// States, controls and multipliers, to be changed.
+    /// Returns states, controls and multipliers, mutably.
     pub fn iterate_mut(&mut self) -> &mut Solution<T, D, M> {
         &mut self.iterate
     }
 
-    /// Makes shared controls of the iterate those of stage 0.
+    /// Sets the shared controls of the iterate to their values at stage 0.
     pub(in crate::ocp) fn equalise_shared_controls(&mut self) {
         let intervals = self.intervals();
         for j in marked_indices(self.qp.view().shared()) {
@@ -73,7 +72,8 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
         }
     }
 
-    /// Makes periodic states of the last stage of the iterate those of the first one.
+    /// Sets the periodic states of the last stage of the iterate to their values at the first
+    /// stage.
     pub(in crate::ocp) fn equalise_periodic_states(&mut self) {
         let last = self.intervals();
         for i in marked_indices(self.qp.view().periodic()) {

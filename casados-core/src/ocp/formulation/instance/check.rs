@@ -1,4 +1,4 @@
-//! What a problem is checked for before it is linearised.
+//! Checks of a problem before its linearisation.
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
@@ -15,8 +15,8 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
-    /// finite.
+    /// Finds parts that are not set, invalid weights of costs, and non-finite numbers in the
+    /// iterate.
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::InvalidWeight`], [`OcpError::InvalidValue`]
@@ -40,7 +40,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::InvalidValue`]
     pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
-        // All numbers at once; names are looked for where one of these is not finite.
+        // Checks all numbers at once; names are determined only if one is not finite.
         if crate::finite::find_non_finite(self.iterate.all_numbers()).is_some() {
             self.find_non_finite()
         } else {
@@ -48,7 +48,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Finds functions of what has no derivatives where the end of the horizon is free.
+    /// Finds functions without the derivatives that a free end time requires.
     ///
     /// # Errors
     /// [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
@@ -69,7 +69,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         terminal.check(at_end)
     }
 
-    /// The first number of the iterate that is not finite.
+    /// Finds the first number of the iterate that is not finite.
     fn find_non_finite(&self) -> Result<(), OcpError> {
         let (last, part) = (self.intervals(), Part::Multipliers);
         for (stage, point) in self.iterate.stages().enumerate() {
@@ -91,7 +91,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Free parameters, or their multipliers, by name.
+    /// Checks free parameters, or their multipliers, by name.
     fn check_free_parameters(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
         let Some((index, value)) = crate::finite::find_non_finite(w) else { return Ok(()) };
         let part = if part == Part::Controls { Part::Parameters } else { part };

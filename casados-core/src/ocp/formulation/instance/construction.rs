@@ -1,4 +1,4 @@
-//! A problem on a horizon is made, in memory of its own or in given one.
+//! Construction of a problem on a horizon, on the heap or in given memory.
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::argument_checks::{ConstraintsOf, CostOf};
@@ -17,12 +17,12 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 impl<D, L, E, G, H> Problem<D, L, E, G, H> {
-    /// The problem on a horizon, with memory on the heap.
+    /// Creates the problem on a horizon, with memory on the heap.
     ///
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
-    /// [`OcpError::OutOfMemory`]; of a free end time [`OcpError::FixedEndTime`],
+    /// [`OcpError::OutOfMemory`]; with a free end time [`OcpError::FixedEndTime`],
     /// [`OcpError::OutOfRange`], [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
@@ -46,7 +46,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         Ok(ocp)
     }
 
-    /// The dimensions of the stages, of which there is one more than there are intervals.
+    /// Returns the dimensions of the stages, which are one more than intervals.
     #[must_use]
     pub const fn dims<T: Real, const STAGES: usize>() -> [StageDims; STAGES]
     where
@@ -60,7 +60,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         dims
     }
 
-    /// How many numbers a problem takes; `usize::MAX` if they are more than that.
+    /// Returns the number of elements of a problem's memory; `usize::MAX` if it overflows.
     #[must_use]
     pub const fn memory<T: Real>(dims: &[StageDims]) -> usize
     where
@@ -71,14 +71,14 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
             .saturating_add(data::data_len::<Self, T>(Layout::new(dims.len().saturating_sub(1), 0)))
     }
 
-    /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
-    /// are [`Problem::dims`].
+    /// Creates the problem on a horizon, in given memory of at least [`Problem::memory`] elements;
+    /// `dims` are [`Problem::dims`].
     ///
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`];
-    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] of a free
-    /// end time and boundary conditions.
+    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] for a
+    /// free end time and for boundary conditions.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,
@@ -121,12 +121,13 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     }
 }
 
-/// Memory that can be had anew: that on the heap.
+/// Memory that can be reallocated: memory on the heap.
 pub trait Reallocatable<V>: AsRef<[V]> + Sized {
-    /// As many elements, copies of the last one behind those that are given.
+    /// Returns memory of this length that begins with `first`; further elements are copies of the
+    /// last one.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] of given memory.
+    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] for given memory.
     #[doc(hidden)]
     fn reallocate(first: &[V], length: usize) -> Result<Self, OcpError>;
 }

@@ -1,4 +1,4 @@
-//! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
+//! The data of a problem on a horizon besides its QP and its iterate, in one block of memory.
 
 use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::ocp::formulation::functions::constraint::Constraints;
@@ -10,68 +10,69 @@ use crate::qp::{SolutionStage, StageDims, padded_len, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// The parts of the memory.
+/// The parts of the block.
 pub(in crate::ocp) struct Data<'a, T> {
     /// Times of the nodes.
     pub times: &'a mut [T],
     /// Parameters of every node.
     pub p: &'a mut [T],
-    /// References of every stage, and of the last one.
+    /// References of every stage, followed by that of the last one.
     pub references: &'a mut [T],
-    /// Lower bounds of the constraints of every stage, and of the last one.
+    /// Lower bounds of the constraints of every stage, followed by those of the last one.
     pub lower: &'a mut [T],
-    /// Upper ones.
+    /// Upper bounds of the constraints, in the same order.
     pub upper: &'a mut [T],
     /// Algebraic states of every stage but the last, and `∂z/∂(x, u)`, row after row.
     pub algebraic: &'a mut [T],
-    /// Weights of the second derivatives of algebraic states, of every stage but the last, if
-    /// anything depends on these.
+    /// Weights of the second derivatives of algebraic states, of every stage but the last; empty if
+    /// no function depends on algebraic states.
     pub weights: &'a mut [T],
-    /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints;
-    /// nothing if there is no `z`.
+    /// Workspace for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and the
+    /// constraints; empty without `z`.
     pub extended: &'a mut [T],
-    /// Room for two matrices and a vector over `(x, u)`.
+    /// Workspace for two matrices and a vector over `(x, u)`.
     pub scratch: &'a mut [T],
     /// Mean and weights of the arrival cost.
     pub arrival: &'a mut [T],
 }
 
-/// How large a problem is.
+/// The dimensions of a problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     pub intervals: usize,
-    /// How many [free parameters](super::super::free) there are.
+    /// The number of copies of the first state and [free
+    /// parameters](super::super::free_parameters).
     pub free_count: usize,
-    /// Rows of every stage but the last for [points inside](super::inside) of intervals.
+    /// Rows for [points inside](super::inner_points) intervals, of every stage but the last.
     pub inner_rows: usize,
     /// Whether algebraic states have bounds at nodes.
     pub has_algebraic_bounds: bool,
 }
 
 impl Layout {
-    /// Of a problem without points inside of intervals.
+    /// The dimensions of a problem without points inside intervals.
     pub const fn new(intervals: usize, free: usize) -> Self {
         Self { intervals, free_count: free, inner_rows: 0, has_algebraic_bounds: false }
     }
 }
 
-/// `NX + NU`, and the free parameters between these.
+/// Returns `NX + NU` and the number of free parameters, which are between states and controls.
 pub(in crate::ocp) const fn stage_variable_count<S: Shape>(free: usize) -> usize {
     S::NX + free + S::NU
 }
 
-/// Whether a cost or a constraint depends on algebraic states.
+/// Returns whether a cost or a constraint depends on algebraic states.
 pub(in crate::ocp) const fn depends_on_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
-/// Rows of the path constraints at nodes, and of what links copies of elements of the first state
-/// to it.
+/// Returns the number of rows of the path constraints at nodes, and of the copies of the first
+/// state.
 pub(in crate::ocp) const fn node_row_count<P: Formulation<T>, T: Real>() -> usize {
     P::Path::ROWS + P::Terminal::INITIAL_STATE_COPIES
 }
 
-/// All rows of a stage but the last.
+/// Returns the number of all rows of a stage but the last.
 pub(in crate::ocp) const fn path_row_count<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
     node_row_count::<P, T>() + layout.inner_rows
 }
@@ -98,13 +99,14 @@ const fn data_lens<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
     ]
 }
 
-/// Two matrices and a vector over `(x, w, u)`, or a gradient over `(x, w, u, z)`.
+/// Returns the length of two matrices and a vector over `(x, w, u)`, or of a gradient over
+/// `(x, w, u, z)`.
 const fn scratch_len<T>(n: usize, nz: usize) -> usize {
     let (matrices, gradient) = ((2 * n + 1) * padded_len::<T>(n), n + nz);
     if matrices < gradient { gradient } else { matrices }
 }
 
-/// How many numbers it takes.
+/// Returns the length of the block.
 pub(in crate::ocp) const fn data_len<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
     let mut rest: &[usize] = &data_lens::<P, T>(layout);
     let mut sum = 0_usize;
@@ -115,7 +117,7 @@ pub(in crate::ocp) const fn data_len<P: Formulation<T>, T: Real>(layout: Layout)
     sum
 }
 
-/// The parts.
+/// Splits the block into its parts.
 pub(in crate::ocp) fn split_data<P: Formulation<T>, T: Real>(
     memory: &mut [T],
     layout: Layout,
@@ -130,7 +132,7 @@ pub(in crate::ocp) fn split_data<P: Formulation<T>, T: Real>(
     Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival }
 }
 
-/// The lower and the upper bounds of all constraints.
+/// Returns the lower and the upper bounds of all constraints.
 pub(in crate::ocp) fn constraint_bounds<P: Formulation<T>, T: Real>(
     memory: &[T],
     layout: Layout,
@@ -140,25 +142,25 @@ pub(in crate::ocp) fn constraint_bounds<P: Formulation<T>, T: Real>(
     [part(memory, begin, lower), part(memory, begin + lower, upper)]
 }
 
-/// The weights of the arrival cost.
+/// Returns the weights of the arrival cost.
 pub(in crate::ocp) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], layout: Layout) -> &[T] {
     let nx = P::Shape::NX;
     part(memory, data_len::<P, T>(layout) - nx * nx, nx * nx)
 }
 
-/// What is given at a node.
+/// The data of a node.
 pub(in crate::ocp) struct Node<'a, T> {
     pub time: T,
     pub p: &'a [T],
-    /// Of its cost.
+    /// The reference of its cost.
     pub reference: &'a [T],
-    /// What its cost is multiplied by: the length of the interval that begins there, if costs are
-    /// rates.
+    /// The factor of its cost: the length of the interval that starts here for running costs,
+    /// otherwise one.
     pub factor: T,
 }
 
 impl<'a, T: Real> Node<'a, T> {
-    /// Of the `times`, `p` and `references` of [`Data`].
+    /// The data of a node, from `times`, `p` and `references` of [`Data`].
     #[inline(always)]
     pub fn new<P: Formulation<T>>(
         k: usize,
@@ -177,7 +179,7 @@ impl<'a, T: Real> Node<'a, T> {
         }
     }
 
-    /// Writes the variables there, with the algebraic states `z`.
+    /// Writes the variables of the node, with the algebraic states `z`.
     #[inline(always)]
     pub fn write_variables<S: Shape>(
         &self,
@@ -194,7 +196,7 @@ impl<'a, T: Real> Node<'a, T> {
     }
 }
 
-/// The dimensions of a stage.
+/// Returns the dimensions of a stage.
 pub(in crate::ocp) const fn stage_dims<P: Formulation<T>, T: Real>(layout: Layout, last: bool) -> StageDims {
     if last {
         StageDims::new(P::Shape::NX, layout.free_count, P::Terminal::ROWS)
@@ -203,18 +205,18 @@ pub(in crate::ocp) const fn stage_dims<P: Formulation<T>, T: Real>(layout: Layou
     }
 }
 
-/// As [`inputs`], and `NZ`.
+/// Returns [`stage_variable_count`] and `NZ`.
 pub(in crate::ocp) const fn variable_and_algebraic_counts<S: Shape>(free: usize) -> [usize; 2] {
     [stage_variable_count::<S>(free), S::NZ]
 }
 
-/// How many numbers a stage keeps: `z`, and `∂z/∂(x, w, u)` row after row.
+/// Returns the number of elements per stage of `z` and `∂z/∂(x, w, u)`, row after row.
 pub(in crate::ocp) const fn algebraic_len<S: Shape>(free: usize) -> usize {
     let [n, nz] = variable_and_algebraic_counts::<S>(free);
     nz * (1 + n)
 }
 
-/// How many numbers `algebraic::ExtendedDerivatives` takes, for stages with so many constraints.
+/// Returns the length of `algebraic::ExtendedDerivatives` for stages with `rows` constraints.
 pub(in crate::ocp) const fn extended_len<S: Shape>(free: usize, rows: usize) -> usize {
     let [n, nz] = variable_and_algebraic_counts::<S>(free);
     if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }

@@ -29,13 +29,13 @@ use crate::shape::Shape;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// What is known of the state at the start.
+/// The kind of initial state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::ocp) enum InitialState {
-    /// Nothing was said.
+    /// Not set.
     Unknown,
     Fixed,
-    /// Given, but for controls that are linear.
+    /// Fixed, except for linear controls.
     PartlyFixed,
     Free,
 }
@@ -46,16 +46,16 @@ pub(in crate::ocp) enum InitialState {
 /// min  Σ_k l(x_k, u_k) + e(x_N)     x_{k+1} = φ(x_k, u_k)     lb ≤ (x_k, u_k) ≤ ub     lg ≤ g(x_k, u_k) ≤ ug
 /// ```
 ///
-/// It holds the data of every stage, an iterate with multipliers, and the QP that
-/// [`Ocp::linearise`] writes at the iterate. The variables of this QP are states and controls
-/// themselves, not their changes: bounds are written into it once, its solution is the next
-/// iterate, and its conditions of optimality at the iterate are those of the problem.
+/// It has the data of every stage, an iterate with multipliers, and the QP that [`Ocp::linearise`]
+/// writes at the iterate. The variables of this QP are states and controls, not steps. Bounds are
+/// therefore written to it once, its solution is the next iterate, and its optimality conditions at
+/// the iterate are those of the problem.
 ///
-/// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`]
-/// takes it.
+/// With the feature `alloc`, `Problem::on` allocates the memory; [`Problem::on_horizon`] uses given
+/// memory.
 ///
-/// It prints itself as mathematics, with names, bounds and sizes (`println!("{ocp}")`). A clone on
-/// the heap has its bounds, data and iterate, and integrators of its own.
+/// `println!("{ocp}")` prints formulas, names, bounds and sizes. A clone on the heap has the same
+/// bounds, data and iterate, and its own integrators.
 ///
 /// # Example
 /// ```
@@ -90,24 +90,23 @@ pub struct Ocp<P, T, D, M> {
     pub(in crate::ocp) qp: Qp<T, D, M>,
     pub(in crate::ocp) iterate: Solution<T, D, M>,
     pub(in crate::ocp) data: M,
-    /// Of the last linearisation, without penalties.
+    /// The objective at the last linearisation, without penalties.
     pub(in crate::ocp) objective: T,
-    /// What was left of the equations of stages where intervals were evaluated last: the sum, and
-    /// the largest.
+    /// The sum and the maximum of the residuals of stage equations at the last evaluation.
     pub(in crate::ocp) stage_residuals: [T; 2],
     pub(in crate::ocp) free: FreeParameters,
     pub(in crate::ocp) inner_points: InnerPoints<T>,
-    /// See [`Nodes`].
+    /// The step length, see [`Nodes`].
     pub(in crate::ocp) step_length: Option<T>,
-    /// Whether algebraic states of the last evaluation are those of the iterate.
+    /// Whether the algebraic states of the last evaluation belong to the iterate.
     pub(in crate::ocp) algebraic_is_current: bool,
 }
 
 /// A problem with its memory on the heap.
 ///
-/// `problem.on(horizon)` makes it; [`Ocp`] has its methods, and an example.
+/// `problem.on(horizon)` creates it; [`Ocp`] has its methods, and an example.
 ///
-/// A function of one's own returns it by what it can do:
+/// Functions return it as a type with the required traits:
 ///
 /// ```
 /// use casados::ocp::{ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, OcpError, Problem};
@@ -162,14 +161,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout = Layout::new(intervals, P::Terminal::INITIAL_STATE_COPIES);
         let Data { times, p, lower, upper, references, .. } = split_data::<P, T>(data.as_mut(), layout);
         horizon.write_times(times)?;
-        // Parameters that nobody sets are found in this way.
+        // NaN marks parameters that are not set.
         p.fill(T::from_f64(f64::NAN));
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
             let (begin, first_copy_row) = (k * path_row_count::<P, T>(layout), P::Path::ROWS);
             let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
             if k < intervals && first_copy_row < path_row_count::<P, T>(layout) {
-                // Copies of the first state are equal to it, at its stage.
+                // Copies of the first state are equal to it at its stage.
                 let bound = if k == 0 { T::ZERO } else { T::from_f64(f64::INFINITY) };
                 let links = [&mut *lower, &mut *upper].into_iter().zip([T::ZERO - bound, bound]);
                 links.for_each(|(to, bound)| {
@@ -195,7 +194,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for copy in 0..P::Terminal::INITIAL_STATE_COPIES {
             qp.share(copy);
         }
-        // Integrals begin at zero.
+        // Integrals start at zero.
         let integrals = P::Shape::NX - <P::Dynamics as Dynamics<T>>::NAMES.integrals..P::Shape::NX;
         if let Some(mut first) = qp.stage_mut(0) {
             integrals.for_each(|i| first.x_bounds_mut().set(i, T::ZERO, T::ZERO));
@@ -215,7 +214,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// How large it is.
+    /// Returns the dimensions of the problem.
     #[inline(always)]
     pub(crate) fn layout(&self) -> Layout {
         Layout {
@@ -225,7 +224,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// A stage of the iterate.
+    /// Returns a stage of the iterate.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`]
@@ -237,8 +236,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// A state and a control as the iterate at every stage, and no multipliers: a start that is
-    /// always there.
+    /// Sets the iterate to a state and a control at every stage, with zero multipliers.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -252,8 +250,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// A state and a control as the iterate at one stage, and no multipliers there. The last stage
-    /// has no control, but those that are linear in time: their rates are zero, and integrals.
+    /// Sets the iterate to a state and a control at one stage, with zero multipliers. The last
+    /// stage has no controls but the linear ones. Rates of linear controls become zero, integrals
+    /// are unchanged.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -296,7 +295,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// Makes copies of the first state what it is.
+    /// Sets the copies of the first state to its values.
     pub(in crate::ocp) fn update_initial_state_copies(&mut self) {
         for copy_index in 0..P::Terminal::INITIAL_STATE_COPIES {
             let first = self.iterate.stages().next();
@@ -314,7 +313,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// What a free parameter is called; of a copy of an element of the first state, this element.
+    /// Returns the name of a free parameter; for a copy of the first state, the name of its
+    /// element.
     pub(in crate::ocp) fn free_parameter_name(&self, index: usize) -> &'static str {
         if index < P::Terminal::INITIAL_STATE_COPIES {
             return self.names().x.get(P::Terminal::copied_state(index)).copied().unwrap_or("");
@@ -323,14 +323,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         parameter.and_then(|parameter| self.names().p.get(parameter).copied()).unwrap_or("")
     }
 
-    /// Everything of the iterate one interval earlier, as the start of the problem of the next
-    /// sampling instant.
+    /// Shifts the iterate by one interval, as the guess for the next sampling instant.
     pub fn shift(&mut self) {
         self.iterate.shift();
     }
 }
 
-/// A stage with the controls of the model alone.
+/// Returns a stage without the free parameters among its controls.
 pub(in crate::ocp) fn without_free_parameters<T>(
     stage: SolutionStage<'_, T>,
     free: usize,
@@ -340,7 +339,7 @@ pub(in crate::ocp) fn without_free_parameters<T>(
     SolutionStage { u, u_lower, u_upper, ..stage }
 }
 
-/// The intervals at a point; weights of algebraic states may be empty.
+/// Returns the intervals at a point; weights of algebraic states may be empty.
 pub(in crate::ocp) fn interval_nodes<'a, S: Shape, T: Real>(
     v: &'a [T],
     multipliers: &'a [T],

@@ -1,4 +1,4 @@
-//! A problem with more variables or more rows than it was made with.
+//! Rebuilding a problem with more variables or rows.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParameters;
@@ -19,11 +19,11 @@ use alloc::vec::Vec;
 impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T> + AsMut<[T]>>
     Ocp<P, T, D, M>
 {
-    /// With these free parameters, one more in front of the controls from `gap` on if there is one;
-    /// and with these rows, behind those that there are.
+    /// Rebuilds the problem with these free parameters and these rows. A new variable is inserted
+    /// at `insert_at` among the controls; new rows follow the existing ones.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] of given memory.
+    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] for given memory.
     pub(in crate::ocp) fn rebuild(
         &mut self,
         free: FreeParameters,
@@ -103,7 +103,8 @@ impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T
         Ok(())
     }
 
-    /// Bounds and couplings, with one more variable in front of the controls from `gap` on.
+    /// Copies bounds and couplings, with one more variable inserted at `insert_at` among the
+    /// controls.
     fn copy_bounds_and_couplings(&self, to: &mut Qp<T, D, M>, insert_at: Option<usize>) {
         let view = self.qp.view();
         let insert_or_end = insert_at.unwrap_or(usize::MAX);
@@ -124,7 +125,7 @@ impl<P: Formulation<T>, T: Real, D: Reallocatable<StageDims>, M: Reallocatable<T
     }
 }
 
-/// Shows every row of path constraints at points, behind the row at the node.
+/// Visits every row of path constraints at points, which follow the rows at the node.
 fn for_each_point_row<P: Formulation<T>, T: Real>(
     inner: &InnerPoints<T>,
     mut copy: impl FnMut(usize, usize),
@@ -136,7 +137,7 @@ fn for_each_point_row<P: Formulation<T>, T: Real>(
     }
 }
 
-/// Copies a list to one with another element at `gap`.
+/// Copies a list to a list with one more element at `insert_at`.
 fn copy_with_insertion<T: Real>(from: &[T], to: &mut [T], insert_at: usize) {
     let (before, after) = from.split_at(insert_at.min(from.len()));
     copy_common(to, before);

@@ -1,10 +1,10 @@
-//! What the Hessian of the QP is.
+//! The Hessian of the QP.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, SecondOrder, Sink};
 use crate::scalar::Real;
 
-/// What is done with the Hessian of a stage that is not positive definite.
+/// The convexification of stages whose Hessian is not positive definite.
 ///
 /// ```
 /// use casados::ocp::{Convexification, Exact, GaussNewton};
@@ -15,26 +15,27 @@ use crate::scalar::Real;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Convexification {
-    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and
-    /// bounds leave, a multiple of the identity is added to all of them, as little as it takes (A.
+    /// Leaves the stages unchanged. If the reduced Hessian of the QP is not positive definite, the
+    /// smallest sufficient multiple of the identity is added to all stages (inertia correction: A.
     /// Wächter, L. T. Biegler, "On the implementation of an interior-point filter line-search
     /// algorithm for large-scale nonlinear programming", Math. Program. 106, 2006, section 3.1).
     /// Near a solution with second-order sufficient conditions nothing is added, and convergence is
-    /// quadratic. This is what [`Sqp`](crate::ocp::Sqp) does; a QP without it is that of `None`.
+    /// quadratic. [`Sqp`](crate::ocp::Sqp) adds the multiple; the QP of a linearisation is that of
+    /// `None`.
     Reduced,
-    /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP
-    /// says if it is not.
+    /// Leaves the stages unchanged, without inertia correction. The reduced Hessian may be positive
+    /// definite although that of a stage is not; otherwise the QP solver returns an error.
     None,
-    /// Eigenvalues that are too small become a small positive number.
+    /// Replaces eigenvalues that are too small by a small positive number.
     #[default]
     Project,
-    /// Eigenvalues get the sign plus.
+    /// Replaces eigenvalues by their absolute values.
     Mirror,
-    /// A multiple of the identity is added, as large as it takes (Levenberg and Marquardt).
+    /// Adds the smallest sufficient multiple of the identity (Levenberg-Marquardt).
     LevenbergMarquardt,
 }
 
-/// What the Hessian of the QP is: [`Exact`], [`GaussNewton`].
+/// The choice of the Hessian of the QP: [`Exact`], [`GaussNewton`].
 ///
 /// ```
 /// use casados::ocp::{Curvature, Exact, GaussNewton, Map};
@@ -48,9 +49,9 @@ pub enum Convexification {
 /// assert!(is_exact(Exact::default()) && !is_exact(GaussNewton::default()));
 /// ```
 pub trait Curvature<D, T: Real>: Copy {
-    /// Whether second derivatives of everything are in it.
+    /// Whether it has the second derivatives of all functions.
     const EXACT: bool;
-    /// How a stage is made convex.
+    /// Returns the convexification of the stages.
     fn convexification(&self) -> Convexification;
     /// Linearises the dynamics.
     ///
@@ -60,8 +61,8 @@ pub trait Curvature<D, T: Real>: Copy {
     fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
 }
 
-/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
-/// none.
+/// The Gauss-Newton Hessian: `JᵀWJ` of least-squares costs and the exact Hessian of general costs;
+/// dynamics and constraints contribute nothing.
 ///
 /// ```
 /// use casados::ocp::{Convexification, GaussNewton};
@@ -71,13 +72,13 @@ pub trait Curvature<D, T: Real>: Copy {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GaussNewton {
-    /// What is done where a general cost is not convex.
+    /// The convexification of general costs.
     pub convexification: Convexification,
 }
 
-/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all
-/// intervals are simulated first: what second derivatives of these states are multiplied by depends
-/// on them.
+/// The Hessian of the Lagrangian. If costs or constraints depend on algebraic states, all intervals
+/// are simulated first: the weights of the second derivatives of these states depend on their
+/// values.
 ///
 /// ```
 /// use casados::ocp::{Convexification, Exact};
@@ -89,7 +90,7 @@ pub struct GaussNewton {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exact {
-    /// What is done where it is not convex. Default [`Convexification::Reduced`].
+    /// The convexification. Default [`Convexification::Reduced`].
     pub convexification: Convexification,
 }
 
@@ -109,8 +110,7 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
     }
 }
 
-/// First derivatives, where the Hessian does not matter yet: it is that of [`GaussNewton`], convex
-/// or not.
+/// First derivatives, with the Hessian of [`GaussNewton`] without convexification.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct FirstOrder;
 

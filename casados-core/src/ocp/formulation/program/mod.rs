@@ -1,6 +1,8 @@
-//! What solvers ask of a problem: the QP at its iterate, values at other points, and names.
+//! The interface between solvers and problems: the QP at the iterate, values at other points, and
+//! names.
 //!
-//! One horizon answers by its functions, phases by the horizons that they consist of.
+//! A problem on one horizon implements it by its functions, phases by the horizons of their
+//! problems.
 
 pub(in crate::ocp) mod curvature;
 
@@ -12,12 +14,11 @@ use crate::scalar::Real;
 use core::ops::Range;
 use curvature::Curvature;
 
-/// What [`Sqp`](crate::ocp::Sqp) and [`Ipm`](crate::ocp::Ipm) solve: a nonlinear program whose QP
-/// has the stages of optimal control.
+/// A nonlinear program whose QP has the stages of optimal control, as [`Sqp`](crate::ocp::Sqp) and
+/// [`Ipm`](crate::ocp::Ipm) solve it.
 ///
-/// A [`Problem`](crate::ocp::Problem) is one, and so are `Phases` of several of them. Whoever is
-/// generic over problems asks for [`Formulation`](crate::ocp::Formulation), of which every one is a
-/// program.
+/// Every [`Problem`](crate::ocp::Problem) is one, and so are `Phases` of several. Generic functions
+/// require [`Formulation`](crate::ocp::Formulation), which implies it.
 ///
 /// ```
 /// use casados::ocp::{HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem, Program};
@@ -35,11 +36,13 @@ use curvature::Curvature;
 /// # Ok::<(), OcpError>(())
 /// ```
 pub trait Program<T: Real>: Sized {
-    /// What a [`Curvature`] is of.
+    /// The dynamics that a [`Curvature`] linearises.
     type Dynamics;
     /// Whether stages of intervals are variables.
     #[doc(hidden)]
-    const LIFTED: bool = false;
+    fn is_lifted(&self) -> bool {
+        false
+    }
 
     /// Writes the QP at the iterate, and its objective.
     #[doc(hidden)]
@@ -48,14 +51,14 @@ pub trait Program<T: Real>: Sized {
         curvature: C,
     ) -> Result<(), OcpError>;
 
-    /// The same with first derivatives, where the Hessian does not matter.
+    /// Writes the QP with first derivatives, for callers that do not use the Hessian.
     #[doc(hidden)]
     fn slopes<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> Result<(), OcpError>;
 
-    /// The objective at some point, without penalties; in `ends` the ends of all intervals, then
-    /// the constraints of all stages.
+    /// Returns the objective at a point, without penalties; writes the ends of all intervals,
+    /// followed by the constraints of all stages, to `ends`.
     #[doc(hidden)]
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
@@ -63,17 +66,17 @@ pub trait Program<T: Real>: Sized {
         ends: &mut [T],
     ) -> Result<T, OcpError>;
 
-    /// The parts of a problem that are there for each of its kind.
+    /// Returns the parts of a problem that every program has.
     #[doc(hidden)]
     fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> ProgramParts<'_, T, D, M>;
 
-    /// Ranges of stages whose variables are the same, of so many stages.
+    /// Returns ranges of stages with equal variables; `stages` is the number of all stages.
     #[doc(hidden)]
     fn spans(&self, stages: usize) -> impl Iterator<Item = Range<usize>>;
 
-    /// A constraint of the QP by its name.
+    /// Returns the name of a constraint of the QP.
     #[doc(hidden)]
     fn name<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &Ocp<Self, T, D, M>,
@@ -81,22 +84,22 @@ pub trait Program<T: Real>: Sized {
         side: Side,
     ) -> ConstraintName;
 
-    /// The derivative that makes a QP one without values.
+    /// Returns the first non-finite derivative in the QP.
     #[doc(hidden)]
     fn derivative<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &Ocp<Self, T, D, M>,
         error: &QpError,
     ) -> Option<OcpError>;
 
-    /// What there is to say of a run that ends: whether the problem is known to be convex, and the
-    /// bound that is violated most, if somebody `asks` for it.
+    /// Returns the results at the end of a run: whether the problem is known to be convex, and the
+    /// largest violation of a bound if it is needed.
     #[doc(hidden)]
     fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         needs_violation: bool,
     ) -> (bool, Option<(ConstraintName, f64)>);
 
-    /// Stages that are variables begin anew, at the iterate.
+    /// Initialises stages that are variables at the iterate.
     #[doc(hidden)]
     fn initialise_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
@@ -105,7 +108,7 @@ pub trait Program<T: Real>: Sized {
         Ok(())
     }
 
-    /// Their step, of one of states and controls.
+    /// Expands a step of states and controls to the stages.
     #[doc(hidden)]
     fn expand_stage_steps<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
@@ -115,26 +118,26 @@ pub trait Program<T: Real>: Sized {
         Ok(())
     }
 
-    /// What happens to them.
+    /// Applies an action to the stages.
     #[doc(hidden)]
     fn apply_stage_action(&mut self, action: StageAction<T>) {
         let _ = action;
     }
 }
 
-/// What there is of a problem, whatever it is.
+/// The parts of a problem that every program has.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct ProgramParts<'a, T, D, M> {
     pub(in crate::ocp) qp: &'a mut Qp<T, D, M>,
     pub(in crate::ocp) iterate: &'a Solution<T, D, M>,
-    /// Lower and upper bounds of the constraints of all stages, as they were given.
+    /// Lower and upper bounds of the constraints of all stages, as the user gave them.
     pub(in crate::ocp) given: [&'a [T]; 2],
-    /// Room for three vectors over the variables of a stage.
+    /// Workspace for three vectors over the variables of a stage.
     pub(in crate::ocp) scratch: &'a mut [T],
 }
 
-/// How many numbers the ends of all intervals are.
+/// Returns the length of the ends of all intervals.
 pub(in crate::ocp) const fn intervals_end(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (0_usize, dims);
     while let Some((_, others)) = rest.split_first() {
@@ -146,7 +149,7 @@ pub(in crate::ocp) const fn intervals_end(dims: &[StageDims]) -> usize {
     length
 }
 
-/// How many numbers the ends of all intervals and the constraints of all stages are.
+/// Returns the length of the ends of all intervals and the constraints of all stages.
 pub(in crate::ocp) const fn ends(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (intervals_end(dims), dims);
     while let Some((first, others)) = rest.split_first() {
@@ -157,13 +160,13 @@ pub(in crate::ocp) const fn ends(dims: &[StageDims]) -> usize {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// A constraint of the QP by its name in the problem.
+    /// Returns the name of a constraint of the QP.
     #[must_use]
     pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
         P::name(self, (field, stage, index), side)
     }
 
-    /// The constraint that makes a QP infeasible.
+    /// Returns the constraint that makes a QP infeasible.
     #[must_use]
     pub fn infeasible(&self, error: &QpError) -> Option<ConstraintName> {
         match *error {
@@ -174,7 +177,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
     }
 
-    /// The derivative that makes a QP one without values.
+    /// Returns the first non-finite derivative in the QP.
     pub(in crate::ocp) fn non_finite_derivative(&self, error: &QpError) -> Option<OcpError> {
         P::derivative(self, error)
     }

@@ -1,11 +1,11 @@
-//! How the barrier parameter changes.
+//! Updates of the barrier parameter `μ`.
 
 use crate::qp::element::set;
 use crate::qp::interior::Inequalities;
 use crate::qp::{Residuals, nan_max};
 use crate::scalar::{Real, Scalar};
 
-/// What the barrier parameter follows.
+/// The update rule of the barrier parameter `μ`.
 ///
 /// ```
 /// use casados::ocp::{Barrier, IpmOptions};
@@ -17,43 +17,43 @@ use crate::scalar::{Real, Scalar};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Barrier {
-    /// It shrinks where the barrier problem is solved well enough: Wächter and Biegler (2006), with
-    /// proofs of convergence.
+    /// Monotone (Fiacco-McCormick): `μ` decreases when the barrier problem is solved accurately
+    /// enough. A. Wächter, L. T. Biegler (2006), with a proof of convergence.
     Monotone,
-    /// It follows a step without barrier, as far as that gets, which is also corrected for the
-    /// products of its changes (S. Mehrotra, SIAM J. Optim. 2, 1992), three times near feasible
-    /// points, while residuals shrink and the reduced Hessian is positive definite; where they do
-    /// not or it is not, it is monotone until they do and it is. It is monotone for good where no
-    /// step is short enough, and where [`final_mu`](super::IpmOptions::final_mu) is not zero.
-    /// J. Nocedal, A. Wächter, R. A. Waltz, SIAM J. Optim. 19 (2009).
+    /// Adaptive: J. Nocedal, A. Wächter, R. A. Waltz, SIAM J. Optim. 19 (2009). In free mode an
+    /// affine-scaling step predicts `μ`, and the step has a higher-order correction (S. Mehrotra,
+    /// SIAM J. Optim. 2, 1992), three times near feasible points. The mode is monotone while
+    /// residuals do not decrease or the reduced Hessian is not positive definite. It remains
+    /// monotone after a failed line search, and if [`final_mu`](super::IpmOptions::final_mu) is
+    /// positive.
     #[default]
     Adaptive,
 }
 
-/// So many errors are remembered.
+/// The number of stored KKT errors.
 const KKT_ERROR_RED_ITERS: usize = 4;
-/// `κ`: an error is to be below this part of the largest of them.
+/// `κ`: in free mode the KKT error must be at most this fraction of the largest stored one.
 const KKT_ERROR_RED_FACT: f64 = 0.9999;
-/// So many steps without regularisation, one after the other, end a monotone phase.
+/// The number of consecutive steps without regularisation that ends monotone mode.
 const UNREGULARISED_STEPS_BEFORE_FREE_MODE: usize = 3;
-/// A monotone phase does not begin with less than this, or the mean product if that is less.
+/// The smallest `μ` at the start of monotone mode, unless the mean complementarity is smaller.
 const MONOTONE_MU_INIT: f64 = 0.1;
 
-/// What an adaptive barrier parameter follows.
+/// State of the adaptive barrier parameter.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp::nlp) struct AdaptiveMu {
     kkt_errors: [f64; KKT_ERROR_RED_ITERS],
     kkt_error_count: usize,
-    /// Whether it may follow steps at all.
+    /// Whether free mode is possible.
     allows_free_mode: bool,
-    /// Whether it does.
+    /// Whether the mode is free rather than monotone.
     in_free_mode: bool,
-    /// Steps without regularisation, one after the other.
+    /// Consecutive steps without regularisation.
     unregularised_steps: usize,
 }
 
 impl AdaptiveMu {
-    /// Of a run that begins.
+    /// The state at the start of a run.
     pub fn new(barrier: Barrier) -> Self {
         let adapts = barrier == Barrier::Adaptive;
         Self {
@@ -65,18 +65,19 @@ impl AdaptiveMu {
         }
     }
 
-    /// Whether it may follow steps.
+    /// Whether free mode is possible.
     pub fn allows_free_mode(&self) -> bool {
         self.allows_free_mode
     }
 
-    /// Whether the next step says what `μ` is.
+    /// Whether the mode is free: the next step determines `μ`.
     pub fn is_in_free_mode(&self) -> bool {
         self.in_free_mode
     }
 
-    /// The next `μ` unless a step says what it is, from the error of the barrier problem as a
-    /// function of `μ`, and the mean product of slacks and multipliers.
+    /// Chooses the mode, and returns the next `μ` of monotone mode, or the given `μ` in free mode.
+    /// `error` is the error of the barrier problem as a function of `μ`; `mean_complementarity` is
+    /// the mean product of slacks and multipliers.
     pub fn update_mu(
         &mut self,
         mu: f64,
@@ -106,7 +107,7 @@ impl AdaptiveMu {
         decrease_mu(mu, error, tolerance)
     }
 
-    /// Counts a step; `μ` if it needed a regularisation and said what `μ` is.
+    /// Counts a step. Returns the first `μ` of monotone mode if a regularised step ends free mode.
     pub fn count_step(&mut self, regularised: bool, mu: f64, mean_complementarity: f64) -> Option<f64> {
         self.unregularised_steps = if regularised { 0 } else { self.unregularised_steps + 1 };
         let ends = regularised && self.in_free_mode;
@@ -115,31 +116,31 @@ impl AdaptiveMu {
     }
 }
 
-/// `μ` of a monotone phase that begins.
+/// The first `μ` of monotone mode.
 fn initial_monotone_mu(mu: f64, mean_complementarity: f64) -> f64 {
     mu.max(mean_complementarity.min(MONOTONE_MU_INIT))
 }
 
-/// The mean of the products of slacks and multipliers.
+/// The mean product of slacks and multipliers.
 pub(super) fn mean_complementarity<T: Real>(inequalities: &Inequalities<'_, T>) -> f64 {
     let products =
         inequalities.slack.iter().zip(&*inequalities.multiplier).map(|(s, l)| s.to_f64() * l.to_f64());
     products.fold(0.0, |sum, product| sum + product) / inequalities.slack.len().max(1) as f64
 }
 
-/// The least `μ`.
+/// The smallest `μ`.
 pub(super) fn min_mu(tolerance: f64) -> f64 {
     tolerance / 10.0
 }
 
-/// `κ_ε`: a barrier problem is solved well enough where its error is below this times `μ`.
+/// `κ_ε`: a barrier problem is solved accurately enough if its error is at most `κ_ε μ`.
 const KAPPA_EPSILON: f64 = 10.0;
 /// `κ_μ`
 const KAPPA_MU: f64 = 0.2;
 /// `θ_μ`
 const THETA_MU: f64 = 1.5;
 
-/// `E_μ`: the largest residual of the conditions of the barrier problem.
+/// `E_μ`: the largest residual of the barrier problem.
 pub(super) fn barrier_error(residuals: &Residuals, complementarity_error: f64) -> f64 {
     let Residuals { stationarity, dynamics, inequalities, .. } = *residuals;
     [stationarity, dynamics, inequalities].into_iter().fold(complementarity_error, nan_max)
@@ -151,15 +152,15 @@ pub(super) fn max_complementarity_error<T: Real>(slacks: &[T], multipliers: &[T]
     products.fold(0.0, |m, (&s, &l)| nan_max(m, (s.to_f64() * l.to_f64() - mu).abs()))
 }
 
-/// What is left of the sides, and of `s λ = μ`, in the barrier problem itself: there soft bounds
-/// are violated a little everywhere.
+/// Residuals of the inequalities and of `s λ = μ` in the barrier problem, in which every soft bound
+/// has a positive violation.
 pub(super) fn barrier_residuals<T: Real>(inequalities: &Inequalities<'_, T>, mu: f64) -> (f64, f64) {
     let all = inequalities.residual.iter().chain(&*inequalities.equation_residual);
     let largest = all.fold(0.0, |m, residual| nan_max(m, residual.abs().to_f64()));
     (largest, max_complementarity_error(inequalities.slack, inequalities.multiplier, mu))
 }
 
-/// The next `μ` where the error is small enough for it.
+/// Decreases `μ` while the error of its barrier problem is small enough.
 pub(super) fn decrease_mu(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64 {
     let (mut mu, min_mu) = (mu, min_mu(tolerance));
     while mu > min_mu && error(mu) <= KAPPA_EPSILON * mu {
@@ -168,17 +169,17 @@ pub(super) fn decrease_mu(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -
     mu
 }
 
-/// `τ`: slacks and multipliers keep `1 − τ` of what they have.
+/// `τ`: the fraction-to-the-boundary rule keeps at least `1 − τ` of slacks and multipliers.
 pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
     (1.0 - mu).max(0.99)
 }
 
-/// Slacks shorter than half of the distances from their bounds, by no more than what counts, become
-/// as long, and their multipliers less: products stay.
+/// Sets slacks below half of the distance from their bound to that distance, if they differ by at
+/// most `max_residual`. Multipliers decrease accordingly: the products `s λ` are unchanged.
 ///
-/// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
-/// determine does not move: that multiplier would go by steps as small as the distance. Others
-/// take over its force.
+/// Inequalities are regularised (`Inequalities::compliance`). Where the dynamics alone determine a
+/// state, the state does not move, and its multiplier would decrease only by steps as small as the
+/// distance.
 pub(super) fn reset_small_slacks<T: Real>(
     inequalities: &mut Inequalities<'_, T>,
     mu: f64,
@@ -196,11 +197,11 @@ pub(super) fn reset_small_slacks<T: Real>(
     correct_bound_multipliers(inequalities, mu);
 }
 
-/// `κ_Σ`: multipliers stay within this factor of `μ / s`.
+/// `κ_Σ`: bounds multipliers to `μ/s` times `1/κ_Σ` to `κ_Σ`.
 const KAPPA_SIGMA: f64 = 1e10;
 
-/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
-/// what its violation costs.
+/// Keeps multipliers within a factor `κ_Σ` of `μ/s`, and the sum of both multipliers of a soft
+/// bound equal to the derivative of its penalty.
 pub(super) fn correct_bound_multipliers<T: Real>(inequalities: &mut Inequalities<'_, T>, mu: f64) {
     let count = inequalities.counts.sides();
     for (multiplier, &slack) in inequalities.multiplier.iter_mut().zip(&*inequalities.slack).take(count) {

@@ -1,4 +1,4 @@
-//! The search direction of an iteration, with or without the curvature that multipliers give.
+//! The search direction, with or without the curvature of dynamics and constraints.
 
 use super::Ipm;
 use super::barrier;
@@ -14,16 +14,17 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// Curvature that needs a larger `δ_w` than this, in units, is that of multipliers on the way to a
-/// feasible point: it leaves steps of the size of rounding errors, and the multipliers that these
-/// have grow with it.
+/// If `δ_w` exceeds this bound (in units) far from a feasible point, the multipliers are reset:
+/// their curvature leaves steps of the size of rounding errors, and the multipliers grow with
+/// `δ_w`.
 const MULTIPLIER_RESET_DELTA_W: f64 = 10.0;
-/// Where violations and gaps are no more than this, in units, multipliers are those of a solution.
+/// If violations and gaps are at most this (in units), the multipliers are kept.
 const MULTIPLIER_RESET_VIOLATION: f64 = 1.0;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// The search direction; without the curvature of dynamics and constraints where that needs too
-    /// much regularisation, far from a feasible point.
+    /// Computes the search direction. Resets the multipliers, and with them the curvature of
+    /// dynamics and constraints, if this curvature requires too large a `δ_w` far from a feasible
+    /// point.
     pub(super) fn search_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -45,8 +46,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(self.regularised_direction(ocp, state, log_row))
     }
 
-    /// The QP at the iterate without multipliers of dynamics and constraints, on which no step
-    /// depends but by the curvature that they give to the Hessian.
+    /// Sets the multipliers of dynamics and constraints in the Hessian to zero, and writes the QP
+    /// again. The step depends on these multipliers through the Hessian only.
     fn reset_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -68,11 +69,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// The regularised Newton step, and the barrier parameter if that follows it; whether it is
-    /// corrected.
+    /// Computes the regularised Newton step, and `μ` in free mode. Returns whether the step has a
+    /// higher-order correction.
     ///
     /// # Errors
-    /// Those of the recursion, where no regularisation helps.
+    /// The errors of the recursion, if no regularisation suffices.
     fn regularised_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -93,7 +94,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             objective_unit,
         )?;
         log_row.regularisation = state.delta_w;
-        let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let mean_complementarity = barrier::mean_complementarity(&iterate.inequalities) / objective_unit;
         let monotone_mu = state.adaptive_mu.count_step(
             state.delta_w > 0.0,
             state.mu / objective_unit,
@@ -104,7 +105,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.mu = mu * objective_unit;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
         } else if in_free_mode {
-            state.mu = predictor::probing_mu(&iterate.sides, min_mu);
+            state.mu = predictor::probing_mu(&iterate.inequalities, min_mu);
             is_corrected =
                 predictor::corrected_step(&mut iterate, state.mu, objective_unit, state.violation)?;
         }

@@ -1,4 +1,4 @@
-//! With memory on the heap.
+//! The interior-point method with memory on the heap.
 
 use super::Ipm;
 use super::IpmOptions;
@@ -10,9 +10,9 @@ use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// A nonlinear interior point with its memory on the heap.
+/// A nonlinear interior-point method with memory on the heap.
 ///
-/// `HeapIpm::new(&ocp)?` makes it; [`Ipm`] has its methods, and an example.
+/// Created by `HeapIpm::new(&ocp)?`; [`Ipm`] has the methods, and an example.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -37,7 +37,7 @@ use alloc::vec::Vec;
 pub type HeapIpm<T = f64> = Ipm<T, Vec<StageDims>, Vec<T>, Vec<u32>>;
 
 impl<T: Real> HeapIpm<T> {
-    /// For a problem.
+    /// Creates a solver for a problem.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -55,7 +55,7 @@ impl<T: Real> HeapIpm<T> {
         })
     }
 
-    /// The iterations of the last run, to be printed.
+    /// The iterations of the last run, for printing.
     #[must_use]
     pub fn log(&self) -> Log<'_> {
         Log(&self.log)

@@ -3,7 +3,8 @@
 use super::barrier;
 use super::kkt::barrier_function;
 use super::kkt::newton::{
-    costates_after_step, evaluate_residuals, kkt_view, kkt_view_of_new_qp, refine_step, resolve,
+    costates_after_step, equation_residuals_after_step, evaluate_residuals, kkt_view, kkt_view_of_new_qp,
+    refine_step, resolve,
 };
 use super::kkt::scaling::{ScaledResiduals, scaled_residuals};
 use super::line_search::{AcceptedStep, FilterModel, LineSearch, LineSearchOutcome, max_step_to_boundary};
@@ -30,26 +31,27 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
-/// it was at the start, or of one: an objective that becomes less leads no farther away.
+/// The largest ratio of violations after and before a step. The reference is at most the initial
+/// violation, or one: a decreasing objective must not lead far from feasible points.
 const MAX_VIOLATION_GROWTH: f64 = 10.0;
-/// The Hessian of the Lagrangian as it is.
+/// The Hessian of the Lagrangian without convexification.
 const EXACT_HESSIAN: Exact = Exact { convexification: Convexification::None };
 
-/// A search direction, and how far it may be gone.
+/// A search direction and its largest step lengths.
 struct SearchDirection {
     filter_model: FilterModel,
     tau: f64,
     max_alpha_primal: f64,
     max_alpha_dual: f64,
-    /// It moves nothing but rounding errors.
+    /// Whether all changes are of the size of rounding errors.
     is_tiny: bool,
-    /// Whether it has the changes of products.
+    /// Whether it has a higher-order correction.
     is_corrected: bool,
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
+    /// Writes the QP at the iterate. New slacks come with new multipliers, which the Hessian
+    /// contains.
     pub(super) fn linearise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -83,7 +85,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, and the best iterate.
+    /// Updates residuals, barrier parameter and best iterate.
     fn update_residuals<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -92,6 +94,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let (plain_objective, [_, of_stages]) =
             (ocp.objective.to_f64(), ocp.stage_residuals.map(|left| left.to_f64()));
+        let of_stages = if ocp.problem.is_lifted() { of_stages } else { 0.0 };
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
@@ -100,21 +103,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.store(&mut view);
         let objective =
             if state.dimensions.in_restoration { plain_objective } else { plain_objective + penalties };
-        if P::LIFTED {
-            residuals.dynamics = nan_max(residuals.dynamics, of_stages);
-        }
+        residuals.dynamics = nan_max(residuals.dynamics, of_stages);
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
-                barrier::barrier_residuals(&iterate.sides, self.options.final_mu);
+                barrier::barrier_residuals(&iterate.inequalities, self.options.final_mu);
         }
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
-        let stage_residual = if P::LIFTED { of_stages } else { 0.0 };
         let units = state.dimensions.units(work.units);
         let ScaledResiduals {
             barrier_residuals: barrier,
             nlp_error: error,
             error_without_complementarity: others,
-        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, stage_residual);
+        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_mu(&iterate, (&barrier.0, barrier.1), &self.options);
         state.update_nlp_error(error, others, &self.options);
         state.largest_gap = barrier.0.dynamics;
@@ -140,7 +140,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Barrier function and violation at the iterate.
+    /// Returns barrier function and violation at the iterate.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -160,8 +160,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.mu,
             dimensions.units(workspace.units),
         );
-        if P::LIFTED {
-            // The QP has the ends of intervals where the next step would lead to.
+        if ocp.problem.is_lifted() {
+            // The QP contains the ends of intervals that the next step of the stages leads to.
             let mut line_search = LineSearch {
                 dimensions: &dimensions,
                 kkt_numbers,
@@ -180,7 +180,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(current_pair)
     }
 
-    /// What is to be expected along the search direction, and how far it may be gone.
+    /// Computes the filter model along the search direction, and the largest step lengths.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -197,7 +197,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let reference_violation = state.initial_violation.max(1.0);
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
-        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
+        let (equation_residual, of_equations) = equation_residuals_after_step(&iterate, work.units);
+        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + of_equations;
         let expected = FilterModel {
             current: here,
             slope: barrier_function::barrier_slope(&iterate, state.mu, work.scratch)
@@ -208,9 +209,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             mu: state.mu,
             delta_w: state.delta_w,
             rounding_violation: rounding,
+            equation_residual,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.dimensions.scaling.objective_unit);
-        let (primal, dual) = predictor::step_lengths(&iterate.sides, tau);
+        let (primal, dual) = predictor::step_lengths(&iterate.inequalities, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
@@ -224,8 +226,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         })
     }
 
-    /// How far the search direction is gone. A corrected one is gone as far as it may be, or
-    /// not at all: then the direction is that without the correction.
+    /// Returns the step length. A corrected direction is taken at its full length; if the filter
+    /// rejects it, the line search uses the direction without correction.
     fn line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -273,7 +275,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         line_search!(workspace).search(ocp, state, expected, *primal, *tau)
     }
 
-    /// Goes the step that was accepted.
+    /// Applies the accepted step.
     fn apply_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -287,10 +289,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.units = &*core::mem::take(&mut work.units);
         let (AcceptedStep { alpha, corrected }, mut dual) = (accepted, direction.max_alpha_dual);
         if corrected {
-            dual =
-                max_step_to_boundary(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+            dual = max_step_to_boundary(
+                iterate.inequalities.multiplier,
+                iterate.inequalities.multiplier_step,
+                direction.tau,
+            );
         }
-        if needs_equal_step_lengths(&iterate.sides) {
+        if needs_equal_step_lengths(&iterate.inequalities) {
             dual = dual.min(alpha);
         }
         costates_after_step(&mut iterate, &mut work, T::from_f64(state.delta_w));
@@ -298,17 +303,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         for (pi, &after) in view.dynamics.iter_mut().zip(&*work.next_costates) {
             *pi = *pi + alpha_number * (after - *pi);
         }
-        let multipliers_and_steps = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        let multipliers_and_steps =
+            iterate.inequalities.multiplier.iter().zip(&*iterate.inequalities.multiplier_step);
         for (of_hessian, (&multiplier, &step)) in
             work.hessian_multipliers.iter_mut().zip(multipliers_and_steps)
         {
             *of_hessian = *of_hessian + alpha_number * (multiplier + step - *of_hessian);
         }
-        iterate.go(alpha_number, T::from_f64(dual));
-        barrier::correct_bound_multipliers(&mut iterate.sides, state.mu);
+        iterate.step_point(alpha_number, T::from_f64(dual));
+        barrier::correct_bound_multipliers(&mut iterate.inequalities, state.mu);
         iterate.store(&mut view);
         ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
-        // The line search ends where it accepts a point; a tiny step has none.
+        // The line search has evaluated the accepted point; a tiny step has no line search.
         ocp.algebraic_is_current = !direction.is_tiny;
         Ok(())
     }
@@ -365,7 +371,7 @@ where
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
-                // A derivative that is not finite is another error.
+                // A non-finite derivative ends the run with an error.
                 ocp.qp_failure_status(error)?;
                 return Ok(self.recover_from_failed_step(ocp, state));
             }
@@ -405,7 +411,7 @@ where
     ) -> bool {
         let restarts = self.try_restart(ocp, state, final_status);
         if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
-            // That is said of the last iterate.
+            // The verdict holds at the last iterate.
             state.best_iteration = *log_row;
         }
         restarts

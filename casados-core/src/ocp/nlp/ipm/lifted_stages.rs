@@ -1,4 +1,4 @@
-//! Stages of intervals that are variables: they begin, go and stay with the iterate.
+//! Lifted stages, which are variables: initialisation, steps, and the best iterate.
 
 use super::Ipm;
 use super::kkt::newton::kkt_view;
@@ -7,16 +7,16 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
-use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, Store, copy_common, part, part_mut};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Stages are those of the guess, or, after a `warm` start, what they were.
+    /// Initialises the stages from the guess; a `warm` start keeps the last ones.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub(super) fn initialise_stages(&mut self, warm: bool) -> Result<(), OcpError> {
-        if !P::LIFTED {
+        if !self.problem.is_lifted() {
             return Ok(());
         }
         self.step_length = Some(T::ZERO);
@@ -26,7 +26,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         P::initialise_stages(self)
     }
 
-    /// The iterate is the best one again.
+    /// Restores the best iterate.
     pub(super) fn restore_best_iterate(&mut self, best: &Solution<T, D, M>) {
         self.iterate.copy_from(best);
         self.algebraic_is_current = false;
@@ -35,7 +35,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// The step of stages that belongs to the search direction.
+    /// Computes the step of the stages that belongs to the search direction.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
@@ -44,13 +44,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         ocp: &mut Ocp<P, T, D, M>,
         state: &RunState<'_>,
     ) -> Result<(), OcpError> {
-        if !P::LIFTED {
+        if !ocp.problem.is_lifted() {
             return Ok(());
         }
         let iterate =
             kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let to = self.trial_point.view_mut();
-        for place in Places::<T>::new(iterate.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
             copy_common(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));
         }
         P::expand_stage_steps(ocp, &self.trial_point)

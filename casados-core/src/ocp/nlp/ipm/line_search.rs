@@ -1,4 +1,4 @@
-//! How far a step goes: the filter line search with second-order corrections.
+//! Filter line search with second-order corrections.
 
 use super::kkt::barrier_function;
 use super::kkt::dimensions::KktDimensions;
@@ -12,41 +12,43 @@ use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, FilterPair, GAMMA_PHI, GAMMA_THETA, S_PHI, S_THETA, switching_condition_holds,
 };
 use crate::qp::interior::Iterate;
-use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
-/// `γ_α`
+/// `γ_α`, a factor of the shortest step.
 const ALPHA_MIN_FRAC: f64 = 0.05;
-/// Corrections of one step.
+/// The largest number of second-order corrections of a step.
 const MAX_SOC: usize = 4;
-/// `κ_soc`: a correction that leaves more of the violation is the last one.
+/// `κ_soc`: a correction that leaves more than this fraction of the violation is the last one.
 const KAPPA_SOC: f64 = 0.99;
 
-/// What is known before a line search.
+/// The filter's model of the barrier function along the search direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FilterModel {
     pub current: FilterPair,
-    /// `∇φᵀ d`, in units of forces.
+    /// The slope `∇φᵀ d`, in units of the objective.
     pub slope: f64,
-    /// `θ_min`: below this violation the barrier function may decide.
+    /// `θ_min`: the switching condition requires a violation of at most this.
     pub theta_min: f64,
-    /// No step leaves more violation.
+    /// The largest acceptable violation of a step.
     pub max_violation: f64,
     pub mu: f64,
     /// `δ_w`
     pub delta_w: f64,
     /// Violations up to this one are rounding errors.
     pub rounding_violation: f64,
+    /// What full steps leave of equations, as a fraction of their values; zero without equations.
+    pub equation_residual: f64,
 }
 
 impl FilterModel {
-    /// Whether the barrier function decides after a step of this length.
+    /// Whether the barrier function must decrease sufficiently for a step of this length.
     fn switching_condition_holds(&self, alpha: f64) -> bool {
         self.current.violation <= self.theta_min
             && switching_condition_holds(alpha, self.slope, self.current.violation)
     }
 
-    /// The shortest step that can be accepted (equation (23)).
+    /// The shortest acceptable step (equation (23)).
     fn min_alpha(&self) -> f64 {
         let FilterPair { violation, .. } = self.current;
         let mut smallest_ratio: f64 = GAMMA_THETA;
@@ -60,18 +62,19 @@ impl FilterModel {
         (ALPHA_MIN_FRAC * smallest_ratio).max(1e-14)
     }
 
-    /// Whether neither the violation nor the barrier function changes by more than rounding errors:
-    /// the step changes multipliers.
+    /// Whether violation and barrier function change by rounding errors and by the residuals that
+    /// refinement leaves in equations only: the step changes multipliers.
     fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
+        let noise = noise + self.equation_residual * self.current.objective.abs();
         self.current.violation <= self.rounding_violation
             && trial_pair.violation <= self.rounding_violation
             && (trial_pair.objective - self.current.objective).abs() <= noise
     }
 
-    /// Whether a point after a step of this length is good enough; the filter grows where the
-    /// barrier function does not decide.
+    /// Whether the point at this step length is acceptable. Adds the iterate to the filter if the
+    /// switching condition does not hold.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, trial_pair: &FilterPair) -> bool {
-        // What rounding leaves of a difference of barrier functions.
+        // The rounding error of a difference of barrier functions.
         let noise = 10.0 * f64::EPSILON * self.current.objective.abs();
         if self.changes_only_rounding(trial_pair, noise) {
             return true;
@@ -89,25 +92,25 @@ impl FilterModel {
     }
 }
 
-/// A step that was accepted.
+/// An accepted step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AcceptedStep {
     pub alpha: f64,
     pub corrected: bool,
 }
 
-/// What a line search finds.
+/// The result of a line search.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum LineSearchOutcome {
-    /// A step.
+    /// An accepted step.
     Step(AcceptedStep),
-    /// No step is short enough.
+    /// No step above the shortest one is acceptable.
     NoStep,
-    /// The time was over before.
+    /// The deadline has passed.
     OutOfTime,
 }
 
-/// The memory that a line search works on.
+/// The memory of a line search.
 pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
     pub dimensions: &'r KktDimensions,
     pub kkt_numbers: &'r mut N,
@@ -124,7 +127,8 @@ where
     N: Store<T>,
     I: Store<u32>,
 {
-    /// Whether the filter accepts a step of this length; a point without a value is not accepted.
+    /// Whether the filter accepts a step of this length. A point with a non-finite function is not
+    /// accepted.
     pub fn accepts<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -138,7 +142,7 @@ where
     /// Halves the step until the filter accepts it.
     ///
     /// # Errors
-    /// [`OcpError::OutOfMemory`]; points without a value are not good enough.
+    /// [`OcpError::OutOfMemory`]; a point with a non-finite function is rejected.
     pub fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -155,9 +159,9 @@ where
             if trial_pair.is_some_and(|there| model.accepts(filter, alpha, &there)) {
                 return Ok(LineSearchOutcome::Step(AcceptedStep { alpha, corrected: false }));
             }
-            // Corrections know nothing of stages.
-            let violation_grows =
-                !P::LIFTED && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
+            // Second-order corrections ignore lifted stages.
+            let violation_grows = !ocp.problem.is_lifted()
+                && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
             if alpha == max_alpha
                 && violation_grows
                 && let Some(alpha) = self.second_order_correction(ocp, filter, model, tau)?
@@ -172,8 +176,7 @@ where
         Ok(LineSearchOutcome::NoStep)
     }
 
-    /// Barrier function and violation after a part of the step; nothing where a function has no
-    /// value.
+    /// Returns barrier function and violation at a step length; `None` if a function is not finite.
     pub fn evaluate_trial<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -187,7 +190,7 @@ where
         let objective = if self.dimensions.in_restoration { 0.0 } else { objective };
         ocp.step_length = Some(T::ZERO);
         let mut gaps = ocp.gap_sum_at(self.trial_point, self.workspace.interval_ends, self.workspace.units);
-        if P::LIFTED {
+        if ocp.problem.is_lifted() {
             gaps += ocp.stage_residuals[0].to_f64();
         }
         let mut iterate =
@@ -195,7 +198,7 @@ where
         let slacks = part(self.workspace.trial_slacks, 0, self.dimensions.counts.pair_count());
         let mut violation = gaps
             + barrier_function::violation_sum(
-                &mut iterate.sides,
+                &mut iterate.inequalities,
                 self.workspace.row_values,
                 slacks,
                 self.workspace.units,
@@ -204,14 +207,14 @@ where
             coupling.evaluate(iterate.qp, self.workspace.row_values);
             violation += coupling.residual_sum();
         }
-        let (penalties, barrier) = barrier_function::penalties_and_barrier(&iterate.sides, slacks);
+        let (penalties, barrier) = barrier_function::penalties_and_barrier(&iterate.inequalities, slacks);
         Some(FilterPair {
             objective: (objective + penalties + mu * barrier) / self.dimensions.scaling.objective_unit,
             violation,
         })
     }
 
-    /// The point and the slacks after a part of the step.
+    /// Writes the trial point and its slacks.
     pub fn write_trial_point<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -221,22 +224,22 @@ where
         let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
         self.trial_point.copy_from(&ocp.iterate);
         let to = self.trial_point.view_mut();
-        for place in Places::<T>::new(iterate.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
             let v = part_mut(to.v, place.v, place.n);
             let from = part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
             for (v, (&from, &step)) in v.iter_mut().zip(from) {
                 *v = from + part_of_step * step;
             }
         }
-        let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
+        let steps = iterate.inequalities.slack.iter().zip(&mut *iterate.inequalities.slack_step);
         for (slack, (&from, &mut step)) in self.workspace.trial_slacks.iter_mut().zip(steps) {
             *slack = from + part_of_step * step;
         }
         Some(())
     }
 
-    /// Second-order corrections: constraints take their values at the point that was tried.
-    /// Afterwards the step is what was accepted, or what it was before.
+    /// Computes second-order corrections, with the constraint values of the trial point. Restores
+    /// the step if no correction is accepted.
     fn second_order_correction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -247,9 +250,12 @@ where
         {
             let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
             copy_common(self.workspace.saved_step, iterate.step);
-            copy_common(self.workspace.saved_slack_step, iterate.sides.slack_step);
-            copy_common(self.workspace.saved_multiplier_step, iterate.sides.multiplier_step);
-            copy_common(self.workspace.saved_free_step, iterate.sides.free_step);
+            copy_common(self.workspace.saved_slack_step, iterate.inequalities.slack_step);
+            copy_common(self.workspace.saved_multiplier_step, iterate.inequalities.multiplier_step);
+            copy_common(
+                self.workspace.saved_equation_multipliers,
+                iterate.inequalities.equation_multiplier_steps,
+            );
         }
         let mut violation = model.current.violation;
         let mut accepted = None;
@@ -265,12 +271,15 @@ where
                     self.workspace.units,
                 )?;
                 iterate.units = self.workspace.units;
-                // Sides keep their slacks; the gradient stays what it was.
+                // Slacks and gradient are unchanged.
                 evaluate_linear_residuals(&mut iterate);
                 let (mu, delta) = (T::from_f64(model.mu), T::from_f64(model.delta_w));
                 let solved = super::kkt::newton::newton_step(&mut iterate, mu, delta)
                     .and_then(|()| refine_step(&mut iterate, self.workspace.units));
-                (solved, max_step_to_boundary(iterate.sides.slack, iterate.sides.slack_step, tau))
+                (
+                    solved,
+                    max_step_to_boundary(iterate.inequalities.slack, iterate.inequalities.slack_step, tau),
+                )
             };
             if solved.is_err() {
                 break;
@@ -289,15 +298,18 @@ where
             let iterate: Iterate<'_, T> =
                 kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
             copy_common(iterate.step, self.workspace.saved_step);
-            copy_common(iterate.sides.slack_step, self.workspace.saved_slack_step);
-            copy_common(iterate.sides.multiplier_step, self.workspace.saved_multiplier_step);
-            copy_common(iterate.sides.free_step, self.workspace.saved_free_step);
+            copy_common(iterate.inequalities.slack_step, self.workspace.saved_slack_step);
+            copy_common(iterate.inequalities.multiplier_step, self.workspace.saved_multiplier_step);
+            copy_common(
+                iterate.inequalities.equation_multiplier_steps,
+                self.workspace.saved_equation_multipliers,
+            );
         }
         Ok(accepted)
     }
 }
 
-/// The longest step after which `1 − τ` of every number is left, at most 1.
+/// The longest step, at most 1, that leaves at least `1 − τ` of every value.
 pub(super) fn max_step_to_boundary<T: Real>(values: &[T], steps: &[T], tau: f64) -> f64 {
     let mut ratio = 1.0f64;
     for (&value, &step) in values.iter().zip(steps) {

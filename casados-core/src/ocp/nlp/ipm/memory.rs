@@ -1,4 +1,4 @@
-//! In memory that is given.
+//! The interior-point method in given memory.
 
 use super::Ipm;
 use super::IpmOptions;
@@ -13,14 +13,14 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
-    /// How many numbers and indices it takes for a problem with so many finite bounds of variables
-    /// and constraints (each side for itself), and equations (pairs of equal bounds) beside the
-    /// state at the start: as much as if all were soft, which they are where no step makes
-    /// progress.
+    /// Returns the lengths of the memory for numbers and for indices, given the number of finite
+    /// bounds of variables and constraints (lower and upper ones counted separately), and of
+    /// equations (pairs of equal bounds) except the initial state. They suffice for all bounds
+    /// being soft, as in elastic mode.
     ///
-    /// Periodic states and shared controls, for which the feature `alloc` is needed, take
-    /// [`InteriorPoint::memory_of_coupling`](crate::qp::InteriorPoint::memory_of_coupling) numbers
-    /// more.
+    /// Periodic states and shared controls, which require the feature `alloc`, take
+    /// [`InteriorPoint::memory_of_coupling`](crate::qp::InteriorPoint::memory_of_coupling) more
+    /// numbers.
     #[must_use]
     pub const fn memory<P: Program<T>>(
         dims: &[StageDims],
@@ -35,8 +35,8 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         (solution.saturating_mul(3).saturating_add(numbers).saturating_add(work), indices)
     }
 
-    /// For problems of these dimensions with at most so many bounds and equations, in given memory
-    /// of the lengths that [`Ipm::memory`] tells.
+    /// Creates a solver for problems of these dimensions with at most so many bounds and equations,
+    /// in memory of the lengths that [`Ipm::memory`] returns.
     ///
     /// # Errors
     /// [`OcpError::Length`]
@@ -58,7 +58,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         let (trial, rest) = numbers.split_at_mut_checked(length).unwrap_or_default();
         let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         let (guess, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
-        // What is more than that is for couplings.
+        // The rest is memory of couplings.
         let (work, numbers) = rest.split_at_mut_checked(work).unwrap_or_default();
         Ok(Self {
             options: IpmOptions::new::<T>(),
@@ -74,7 +74,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
     }
 }
 
-/// Numbers of Newton's equations, numbers beside them, and indices.
+/// The lengths of Newton's equations, of the workspace, and of the indices.
 const fn memory_lengths<T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
     let counts = counts_with_all_bounds_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
     let work = Workspace::<T>::length(dims, ends(dims), &counts);

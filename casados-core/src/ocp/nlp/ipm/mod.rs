@@ -1,4 +1,4 @@
-//! A nonlinear interior point on the structure of optimal control.
+//! Nonlinear interior-point method with the structure of optimal control.
 //!
 //! ```text
 //! min  f(v) − μ Σ log s        c(v) = 0,  σ (g(v) − bound) = s        μ → 0
@@ -6,19 +6,19 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `run`, `iteration` | the iterations, and one of them |
-//! | `start`, `multipliers` | the first point and its multipliers |
-//! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
-//! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
-//! | `scaling` | units of forces, and the sizes of multipliers |
-//! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
+//! | `run`, `iteration` | the loop, and one iteration |
+//! | `kkt/initial_point`, `multipliers` | the initial point and its multipliers |
+//! | `kkt/newton`, `direction` | Newton's equations (Riccati recursion), and their regularisation |
+//! | `kkt/barrier_function`, `line_search` | barrier function, filter line search |
+//! | `kkt/scaling` | the objective unit, and the scaling by multipliers |
+//! | `barrier`, `predictor` | updates of `μ`, and the affine-scaling step that predicts `μ` |
 //! | `restoration` | restoration phase, elastic mode, restart from a simulation, verdicts |
 //! | `violations` | whether violations are stationary |
-//! | `lifted` | stages that are variables go with the iterate |
+//! | `lifted_stages` | steps of stages that are variables |
 //!
-//! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
-//! Riccati recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has
-//! a factor of Cholesky.
+//! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). The Riccati recursion
+//! determines the inertia: the reduced Hessian is positive definite if `M_uu` of every stage has a
+//! Cholesky factor.
 
 mod barrier;
 mod direction;
@@ -48,23 +48,24 @@ use crate::qp::Solution;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// A nonlinear interior point for an [`Ocp`](crate::ocp::Ocp), with exact Hessians.
+/// A nonlinear interior-point method for an [`Ocp`](crate::ocp::Ocp), with exact Hessians.
 ///
 /// ```text
 /// min  f(v) − μ Σ log s        x_{k+1} = φ(x_k, u_k),  σ (g(v) − bound) = s,  x₀[i] = x_N[i] where asked
 /// ```
 ///
-/// It needs dynamics with second derivatives ([`SecondOrder`](crate::ocp::SecondOrder)). Bounds
-/// that are equal are equations; soft ones have their penalties. An iteration costs one evaluation
-/// with Hessians, one Riccati factorisation, and one simulation for each point that the line search
-/// tries. Where no step makes progress, violations of bounds of states and constraints alone are
-/// made small; where they stay, the bound that is violated most is named. Before it gives up it
-/// begins again, once, at a simulation with the controls of its guess, if that violates less. The
-/// iterate of the problem is the best one afterwards, whatever the status; where violations stay,
-/// the one at which they do.
+/// It requires dynamics with second derivatives ([`SecondOrder`](crate::ocp::SecondOrder)). Equal
+/// bounds are equations; soft bounds have penalties. An iteration costs one evaluation with
+/// Hessians, one Riccati factorisation, and one simulation for each trial point of the line search.
 ///
-/// [`HeapIpm`] allocates its memory; [`Ipm::in_memory`] takes it, and then a run allocates nothing
-/// but its log, with the feature `alloc`.
+/// If the line search fails, a restoration phase minimises the violations of bounds of states and
+/// constraints. If they are stationary, the status is `Infeasible` and names the largest violation.
+/// Before it gives up, the run restarts once from a simulation with the controls of the guess, if
+/// that violates less. Afterwards the iterate of the problem is the best one, or the last one after
+/// `Infeasible`.
+///
+/// [`HeapIpm`] allocates its memory. With [`Ipm::in_memory`] a run allocates only its log, with the
+/// feature `alloc`.
 ///
 /// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion,
 /// inertia by J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).
@@ -94,18 +95,18 @@ use alloc::vec::Vec;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Ipm<T, D, M, I> {
-    /// Options, which may be changed between calls.
+    /// Options, which may be changed between runs.
     pub options: IpmOptions,
-    /// A point that is tried.
+    /// The trial point of the line search.
     trial_point: Solution<T, D, M>,
     /// The best iterate.
     best_iterate: Solution<T, D, M>,
-    /// The first iterate.
+    /// The initial point.
     guess: Solution<T, D, M>,
-    /// Of Newton's equations.
+    /// Memory of Newton's equations.
     kkt_numbers: M,
     kkt_indices: I,
-    /// See [`Work`](work::Work).
+    /// See [`Workspace`](kkt::workspace::Workspace).
     workspace: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,

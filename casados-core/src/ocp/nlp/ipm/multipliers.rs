@@ -1,4 +1,5 @@
-//! Multipliers: the first ones, those that the Hessian has, and those that hold slacks.
+//! Multipliers: least-squares multipliers, multipliers of the Hessian, and the reset of small
+//! slacks.
 
 use super::Ipm;
 use super::barrier;
@@ -16,19 +17,19 @@ use crate::ocp::formulation::program::Program;
 use crate::qp::{StageDims, Store, copy_common};
 use crate::scalar::Real;
 
-/// First multipliers that are more units are discarded.
+/// The largest initial multiplier in units; if one is larger, all are discarded.
 const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Slacks and multipliers of the first iteration, or of new penalties.
+    /// Initialises slacks and multipliers in the first iteration, or for new penalties.
     pub(super) fn initialise_slacks_and_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut RunState<'_>,
     ) -> Result<(), OcpError> {
-        // Multipliers of hard bounds say nothing about penalties.
+        // Multipliers of hard bounds are not those of penalties.
         let warm = self.options.warm_start && state.elastic_penalty.is_none();
-        // Other penalties have their numbers at other places.
+        // New penalties change the layout of the memory.
         self.kkt_numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
@@ -51,15 +52,16 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let objective_unit = state.dimensions.scaling.objective_unit;
         initialise_inequalities(&mut iterate, &self.options, warm, state.mu, units, &view);
         if state.dimensions.in_restoration {
-            phase::start_on_central_path(&mut iterate.sides, state.mu);
+            phase::start_on_central_path(&mut iterate.inequalities, state.mu);
         }
         iterate.store(&mut view);
         if warm {
-            copy_common(work.hessian_multipliers, iterate.sides.multiplier);
+            copy_common(work.hessian_multipliers, iterate.inequalities.multiplier);
         } else if least_squares_multipliers(&mut iterate, &mut work, objective_unit).is_ok() {
             let is_small =
                 |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * objective_unit);
-            let sides = scaling::row_values_with_units(iterate.sides.rows, work.hessian_multipliers, rows);
+            let sides =
+                scaling::row_values_with_units(iterate.inequalities.rows, work.hessian_multipliers, rows);
             if scaling::gaps_with_units(iterate.qp.dims, work.next_costates, rows).chain(sides).all(is_small)
             {
                 copy_common(view.dynamics, work.next_costates);
@@ -72,7 +74,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Ok(())
     }
 
-    /// Writes the multipliers that the Hessian has.
+    /// Writes the multipliers of the Hessian into the iterate.
     pub(super) fn load_hessian_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -83,15 +85,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut view = solution.view_mut();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
-        copy_common(work.trial_slacks, iterate.sides.multiplier);
-        copy_common(iterate.sides.multiplier, work.hessian_multipliers);
+        copy_common(work.trial_slacks, iterate.inequalities.multiplier);
+        copy_common(iterate.inequalities.multiplier, work.hessian_multipliers);
         iterate.load_point(&view);
         iterate.store(&mut view);
-        copy_common(iterate.sides.multiplier, work.trial_slacks);
+        copy_common(iterate.inequalities.multiplier, work.trial_slacks);
         Ok(())
     }
 
-    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
+    /// Resets slacks that are shorter than the distances from their bounds.
     pub(super) fn reset_small_slacks<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -99,7 +101,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
-        barrier::reset_small_slacks(&mut iterate.sides, state.mu, self.options.tolerance);
+        barrier::reset_small_slacks(&mut iterate.inequalities, state.mu, self.options.tolerance);
         let mut view = solution.view_mut();
         iterate.store(&mut view);
         evaluate_residuals(&mut iterate, &mut view);

@@ -1,15 +1,15 @@
-//! What can be chosen.
+//! Options of the interior-point method.
 
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
 use crate::scalar::Real;
 
-/// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation
+/// Options of [`Ipm`](super::Ipm). Symbols are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
 /// Program. 106 (2006).
 ///
-/// A later version may have more fields: change those of a solver, or write
+/// Later versions may have more fields: change the options of a solver, or write
 /// `..IpmOptions::new::<f64>()`.
 ///
 /// ```
@@ -20,67 +20,68 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below: the stationarity
-    /// over `s_d` and the complementarity over `s_c`, which are `max(1, mean |multiplier| / 100)`
-    /// of all multipliers and of those of bounds in their units ([`scaling`](Self::scaling)).
-    /// Where units are above 100 the tolerance is this times a hundredth of them, where they are
-    /// below one it is this times the unit. Default 1e-8; of single precision 1e-3.
+    /// The run converges when all four [`Residuals`](crate::qp::Residuals) are at most this.
+    /// Stationarity is divided by `s_d`, complementarity by `s_c`:
+    /// `max(1, mean |multiplier| / 100)` of all multipliers, and of those of bounds, in their units
+    /// ([`scaling`](Self::scaling)). For units above 100 the tolerance is multiplied by a hundredth
+    /// of the unit, for units below one by the unit. Default 1e-8, in single precision 1e-3.
     pub tolerance: f64,
-    /// A point whose residuals stay below this for `acceptable_iterations` is accepted where the
-    /// tolerance is not reached, as is the best one where no more steps are gone. Default
-    /// 1e-6; of single precision 1e-2.
+    /// A run ends as acceptable after `acceptable_iterations` iterations with residuals up to this,
+    /// or if it ends without progress or at the maximum number of iterations and the residuals of
+    /// the best iterate are at most this. Default 1e-6, in single precision 1e-2.
     pub acceptable_tolerance: f64,
-    /// See [`acceptable_tolerance`](Self::acceptable_tolerance); zero is as one. Default 15.
+    /// See [`acceptable_tolerance`](Self::acceptable_tolerance); zero means one. Default 15.
     pub acceptable_iterations: usize,
-    /// After so many iterations a run ends with
-    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations). With zero the start is judged
-    /// alone. Default 500: from starts far away a few hundred are taken.
+    /// The largest number of iterations; then the status is
+    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations). With zero only the start is
+    /// tested. Default 500: distant guesses take a few hundred.
     pub max_iterations: usize,
-    /// The first barrier parameter `μ`, in units of forces: at most 1e10. Default 0.1.
+    /// The first barrier parameter `μ`, in units of the objective: at most 1e10. Default 0.1.
     pub start_mu: f64,
-    /// The last one: what is solved is the barrier problem with this `μ`, whose solutions are
-    /// smooth functions of the data. Default 0, the problem itself.
+    /// The last barrier parameter: with a positive value the barrier problem with this `μ` is
+    /// solved, whose solutions are smooth functions of the data. Default 0, the problem itself.
     pub final_mu: f64,
-    /// What it follows. Default [`Barrier::Adaptive`].
+    /// The update rule of the barrier parameter. Default [`Barrier::Adaptive`].
     pub barrier: Barrier,
-    /// Bounds are left by this at the start, relative to their size and to the room between them;
-    /// at most 0.5. Default 1e-2.
+    /// The distance of the initial point from its bounds, relative to their size and to the
+    /// distance between two bounds; at most 0.5. Default 1e-2.
     pub bound_push: f64,
-    /// Whether constants of the algorithm are multiples of units, found where a run begins. That of
-    /// forces is
+    /// Whether constants of the algorithm are multiples of units, computed at the start of a run.
+    /// The unit of the objective `f` is
     ///
     /// ```text
     /// max over i of  unit_i max(|∂f/∂v_i|, |∂²f/∂v_i²| max(|v_i|, unit_i))
     /// ```
     ///
-    /// of the objective `f`. The unit of a variable is its largest guess, one of its bounds or the
-    /// room between them, whichever is nearest to one, and that of a path or terminal constraint
-    /// its largest gradient or distance from the bounds, over all stages; from 0.01 to 100 it is
-    /// one. Iterates, residuals and the log are in the units of the problem. Without this all
-    /// units are one. Default true.
+    /// The unit of a variable is its largest guess, one of its bounds or the distance between them,
+    /// whichever is nearest to one; the unit of a path or terminal constraint is its largest
+    /// gradient or distance from its bounds; both over all stages. Units from 0.01 to 100 are
+    /// replaced by one. Iterates, residuals and the log are in the units of the problem. Without
+    /// scaling all units are one. Default true.
     pub scaling: bool,
-    /// Whether slacks and multipliers begin at those of the iterate. Default false.
+    /// Whether the initial slacks and multipliers are those of the iterate. Default false.
     pub warm_start: bool,
-    /// As [`bound_push`](Self::bound_push), where the start is warm
-    /// ([`warm_start`](Self::warm_start)). Default 1e-6.
+    /// [`bound_push`](Self::bound_push) of a warm start ([`warm_start`](Self::warm_start)). Default
+    /// 1e-6.
     pub warm_push: f64,
-    /// Whether violations of bounds of states and constraints alone are made small where no step
-    /// makes progress, and then get penalties beside the objective. Default true.
+    /// Whether a failed line search is followed by a restoration phase, then by elastic mode, for
+    /// bounds of states and constraints. Default true.
     pub elastic: bool,
-    /// The first of these penalties, linear, in units of forces over those of what is bounded; they
-    /// grow by factors of ten up to ten thousand times that. At most 1e10. Default 1e2.
+    /// The first linear penalty of elastic mode, in units of the objective over units of the
+    /// bounded quantity; it grows by factors of ten up to 1e4 times this. At most 1e10. Default
+    /// 1e2.
     pub elastic_penalty: f64,
-    /// Whether a run begins at a point beside a guess at which the gradient of a violated
-    /// constraint vanishes: its linearisation says nothing of where it holds. Default true.
+    /// Whether a guess is perturbed at which the gradient of a violated constraint vanishes, since
+    /// its linearisation has no solution. Default true.
     pub perturb_start: bool,
-    /// Whether a run that fails, or leads nowhere for long, begins once more: at a simulation with
-    /// the controls of the guess, or beside it where violations are still those of the guess.
-    /// Default true.
+    /// Whether a run that fails or stalls restarts once: from a simulation with the controls of the
+    /// guess, or with perturbed controls if the violations are still those of the guess. Default
+    /// true.
     pub restart: bool,
 }
 
 impl IpmOptions {
-    /// For numbers of some precision.
+    /// The defaults for a number type.
     #[must_use]
     pub fn new<T: Real>() -> Self {
         let (tolerance, acceptable_tolerance) = if T::EPSILON < 1e-10 { (1e-8, 1e-6) } else { (1e-3, 1e-2) };
@@ -103,17 +104,17 @@ impl IpmOptions {
         }
     }
 
-    /// The tolerance, or what the last barrier parameter leaves, in units of forces.
+    /// The tolerance, at least ten times the last barrier parameter, in units of the objective.
     pub(super) fn barrier_tolerance(&self, objective_unit: f64) -> f64 {
         (self.tolerance * tolerance_factor(objective_unit)).max(10.0 * self.final_mu) / objective_unit
     }
 
-    /// The first barrier parameter.
+    /// The first barrier parameter, scaled by the objective unit.
     pub(super) fn scaled_start_mu(&self, objective_unit: f64) -> f64 {
         (self.start_mu * objective_unit).clamp(self.final_mu, f64::MAX)
     }
 
-    /// Finds values that no run can have.
+    /// Checks that all values are allowed.
     pub(super) fn validate(&self) -> Result<(), OcpError> {
         let positive = [("tolerance", self.tolerance), ("acceptable_tolerance", self.acceptable_tolerance)];
         for (name, value) in positive {
@@ -121,7 +122,7 @@ impl IpmOptions {
                 return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and finite" });
             }
         }
-        // Products with units of the problem are finite.
+        // Products with units of the problem must be finite.
         for (name, value) in [("start_mu", self.start_mu), ("elastic_penalty", self.elastic_penalty)] {
             if !(value > 0.0 && value <= 1e10) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 1e10" });
@@ -132,7 +133,7 @@ impl IpmOptions {
             let allowed = "from 0 to `start_mu`";
             return Err(OcpError::InvalidOption { name: "final_mu", value: last, allowed });
         }
-        // Two bounds push from both sides.
+        // Two bounds push the point from opposite sides.
         for (name, value) in [("bound_push", self.bound_push), ("warm_push", self.warm_push)] {
             if !(value > 0.0 && value <= 0.5) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 0.5" });

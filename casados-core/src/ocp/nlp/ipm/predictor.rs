@@ -1,5 +1,5 @@
-//! The step without barrier: what it gets to says what `μ` is, and its changes correct the step
-//! towards `μ`.
+//! Mehrotra's predictor: the affine-scaling step (`μ = 0`) predicts `μ`, and its products of slack
+//! and multiplier changes correct the step towards `μ`.
 //!
 //! S. Mehrotra, "On the implementation of a primal-dual interior point method", SIAM J. Optim. 2
 //! (1992); T. J. Carpenter, I. J. Lustig, J. M. Mulvey, D. F. Shanno, "Higher-order
@@ -13,30 +13,31 @@ use crate::qp::QpError;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
 
-/// Corrections one after the other, each for the changes of the step before. With the same factors
-/// they cost little beside derivatives, and where a slack and its multiplier both vanish a step
-/// leaves a fifteenth of their product instead of a seventh.
+/// The largest number of higher-order corrections, each for the products of the last step. They use
+/// the same factors and cost little compared to derivatives. Where a slack and its multiplier both
+/// vanish, a step leaves a fifteenth of their product instead of a seventh.
 const MAX_CORRECTIONS: usize = 3;
-/// One is enough where more than this is violated, in units: there the QP is far from the problem.
+/// The violation, in units, above which there is only one correction: the QP is a poor model there.
 const MULTIPLE_CORRECTIONS_VIOLATION: f64 = 0.3;
-/// A corrected step that is shorter than this is not taken: products are too different for the
-/// correction to be right.
+/// The smallest length of a corrected step; shorter ones are replaced by the uncorrected step,
+/// since the products differ too much for the correction.
 const MIN_CORRECTED_STEP: f64 = 0.6;
 
-/// The lengths of the primal and of the dual step that keep `1 − τ` of slacks and multipliers.
+/// Returns the primal and the dual step length that keep `1 − τ` of slacks and multipliers.
 pub(super) fn step_lengths<T: Real>(inequalities: &Inequalities<'_, T>, tau: f64) -> (f64, f64) {
     let primal = max_step_to_boundary(inequalities.slack, inequalities.slack_step, tau);
     let dual = max_step_to_boundary(inequalities.multiplier, inequalities.multiplier_step, tau);
     if needs_equal_step_lengths(inequalities) { (primal.min(dual), primal.min(dual)) } else { (primal, dual) }
 }
 
-/// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
+/// Whether primal and dual step lengths must be equal: quadratic penalties couple them by
+/// `λ + ν = linear + quadratic e`.
 pub(super) fn needs_equal_step_lengths<T: Real>(inequalities: &Inequalities<'_, T>) -> bool {
     inequalities.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }
 
-/// `μ` after the step without barrier that is there: the mean product, times the third power of
-/// what that step, as far as it may be gone, leaves of it.
+/// Returns `μ` predicted by the present affine-scaling step: the mean complementarity times the
+/// cube of the fraction that the step leaves.
 pub(super) fn probing_mu<T: Real>(inequalities: &Inequalities<'_, T>, min_mu: f64) -> f64 {
     let (primal, dual) = step_lengths(inequalities, 1.0);
     let mean_complementarity = barrier::mean_complementarity(inequalities);
@@ -47,16 +48,17 @@ pub(super) fn probing_mu<T: Real>(inequalities: &Inequalities<'_, T>, min_mu: f6
         slacks.zip(multipliers).map(|(s, l)| value_after_step(s, primal) * value_after_step(l, dual));
     let sum = products.fold(0.0, |sum, product| sum + product);
     let ratio = sum / inequalities.slack.len().max(1) as f64 / mean_complementarity;
-    // Without sides there is no ratio.
+    // Without inequalities the ratio is not a number.
     let ratio = if ratio > 0.0 { ratio.min(1.0) } else { 0.0 };
     (ratio * ratio * ratio * mean_complementarity).max(min_mu)
 }
 
-/// The step towards `μ`, corrected for its own changes, beginning with those of the step without
-/// barrier that is there; whether it is.
+/// Computes the step towards `μ` with higher-order corrections, starting from the present
+/// affine-scaling step. Returns whether the corrected step is accepted; otherwise the step is the
+/// uncorrected one.
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(super) fn corrected_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: f64,
@@ -68,7 +70,7 @@ pub(super) fn corrected_step<T: Real>(
         resolve(iterate, T::from_f64(mu), true)?;
     }
     let tau = barrier::fraction_to_boundary(mu / objective_unit);
-    let (primal, dual) = step_lengths(&iterate.sides, tau);
+    let (primal, dual) = step_lengths(&iterate.inequalities, tau);
     let is_accepted = primal.min(dual) >= MIN_CORRECTED_STEP && iterate.step.iter().all(|d| d.is_finite());
     if !is_accepted {
         resolve(iterate, T::from_f64(mu), false)?;

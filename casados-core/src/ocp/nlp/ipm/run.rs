@@ -1,4 +1,4 @@
-//! The iterations.
+//! Entry points, initialisation and end of a run.
 
 use super::Ipm;
 use super::kkt::dimensions::KktDimensions;
@@ -16,15 +16,16 @@ use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
-/// IPOPT's `diverging_iterates_tol`, as a multiple of the largest size in the data of a problem.
+/// IPOPT's `diverging_iterates_tol`, relative to the largest magnitude in the data of the problem.
 const DIVERGING_ITERATES: f64 = 1e12;
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
+    /// Solves a problem from its iterate. Afterwards the iterate is the best one, whatever the
+    /// status, or the last one after `Converged` and `Infeasible`.
     ///
     /// # Errors
-    /// [`OcpError::Length`] where the memory is that of another problem; [`OcpError::Missing`],
+    /// [`OcpError::Length`] if the memory is that of another problem; [`OcpError::Missing`],
     /// [`OcpError::InvalidOption`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`]
-    /// where a function has no value at the start.
+    /// if a function is not finite at the start.
     pub fn solve<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
         Exact: Curvature<P::Dynamics, T>,
@@ -32,9 +33,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         self.run(ocp, &mut |_| ControlFlow::Continue(()), &mut || false)
     }
 
-    /// As [`Ipm::solve`], until the time is over: `over` is asked after each evaluation of the
-    /// problem, factorisation and trial of the line search. A clock, or a counter of cycles. Then
-    /// the status is [`Status::OutOfTime`], and the iterate the best one until then.
+    /// [`Ipm::solve`] with a deadline: `over` is called after each evaluation of the problem,
+    /// factorisation and trial point, and may read a clock or a counter of cycles. When it returns
+    /// true the status is [`Status::OutOfTime`], and the iterate the best one so far.
     ///
     /// # Errors
     /// As [`Ipm::solve`].
@@ -71,7 +72,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
     }
 
-    /// As [`Ipm::solve`], with an observer of the iterations that may stop the run.
+    /// [`Ipm::solve`] with an observer of the iterations, which may stop the run.
     ///
     /// # Errors
     /// As [`Ipm::solve`].
@@ -98,7 +99,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         ocp.check_dimensions(self.trial_point.dims())?;
         self.options.validate()?;
         ocp.initialise_stages(self.options.warm_start)?;
-        // Bounds of constraints are in the QP once it is written.
+        // The QP contains the bounds of constraints only after it is written.
         let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial_point, self.options.perturb_start)?;
         let (lengths, capacity, is_linearised) = self.initialise(ocp)?;
         let mut state = RunState::new(deadline_passed, (lengths, capacity), is_linearised, &self.options);
@@ -130,8 +131,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         result.map(|()| outcome)
     }
 
-    /// Memory for all that may come, a point inside of the bounds, and what is remembered of the
-    /// problem; whether the point is still the one that the problem was linearised at.
+    /// Initialises memory, units and the point inside the bounds. Returns the dimensions, the
+    /// largest dimensions, and whether the point is still that of the linearisation.
     fn initialise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

@@ -1,4 +1,4 @@
-//! What a run remembers.
+//! State of a run.
 
 use super::IpmOptions;
 use super::barrier::{self, AdaptiveMu, Barrier};
@@ -12,88 +12,89 @@ use crate::qp::Residuals;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
 
-/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
-/// are no convergence of Newton's method.
+/// Complementarity stalls if in so many consecutive iterations it is the only residual above the
+/// tolerance, and at least this fraction of the error remains.
 const COMPLEMENTARITY_STALL_ITERATIONS: usize = 3;
 const STALLED_COMPLEMENTARITY_RATIO: f64 = 0.9;
 
-/// Steps that are no longer lead nowhere if there are many of them.
+/// Steps up to this length count as stalled.
 const SHORT_STEP: f64 = 1.0 / 32.0;
 
-/// What a run remembers from one iteration to the next.
+/// State of a run, kept between iterations.
 pub(in crate::ocp::nlp) struct RunState<'c> {
-    /// Whether the time is over.
+    /// Whether the deadline has passed.
     pub deadline_passed: &'c mut dyn FnMut() -> bool,
     pub dimensions: KktDimensions,
-    /// Those of memory: of every bound soft.
+    /// The dimensions of the memory: with every bound soft.
     pub max_dimensions: KktDimensions,
-    /// Whether the run began beside the guess.
+    /// Whether the guess has been perturbed.
     pub has_perturbed_start: bool,
     /// The barrier parameter.
     pub mu: f64,
-    /// What an adaptive one follows.
+    /// State of the adaptive barrier parameter.
     pub adaptive_mu: AdaptiveMu,
     pub filter: Filter,
-    /// `θ_min`: below this violation the barrier function may decide.
+    /// `θ_min`: the switching condition requires a violation of at most this.
     pub theta_min: f64,
-    /// The violation that the filter began with.
+    /// The violation at which the filter was initialised.
     pub initial_violation: f64,
     pub regularisation: Regularisation,
-    /// `δ_w` of the step.
+    /// `δ_w` of the last step.
     pub delta_w: f64,
-    /// The penalty, if bounds are soft.
+    /// The penalty of elastic mode, or of the restoration phase.
     pub elastic_penalty: Option<f64>,
-    /// Whether this is a second attempt.
+    /// Whether the run has restarted.
     pub second_attempt: bool,
-    /// Phases in which violations alone are made small.
+    /// State of the restoration phase.
     pub restoration: RestorationPhase,
     /// The largest gap or violation, in units.
     pub violation: f64,
-    /// The largest gap.
+    /// The largest gap, in units.
     pub largest_gap: f64,
     /// The largest gap or violation of the best iterate.
     pub best_violation: f64,
     /// The objective at the first iterate.
     pub initial_objective: f64,
-    /// The violation that the last penalty left.
+    /// The violation that the last penalty has left.
     pub last_elastic_violation: f64,
-    /// Iterations one after the other whose residuals are acceptable.
+    /// Consecutive iterations with acceptable residuals.
     pub acceptable_iterations: usize,
-    /// Iterations one after the other in which complementarity is all that is left, and stays.
+    /// Consecutive iterations in which complementarity is the only remaining residual, and stalls.
     pub complementarity_stall_iterations: usize,
-    /// Whether slacks that multipliers held were released.
+    /// Whether small slacks have been reset.
     pub has_reset_slacks: bool,
-    /// Steps one after the other that are short, or of phases for violations.
+    /// Consecutive steps that are short, or in the restoration phase.
     pub stalled_iterations: usize,
-    /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
+    /// Whether slacks and multipliers belong to the present bounds, hard or soft.
     pub slacks_are_current: bool,
-    /// Whether the QP is that at the iterate, with whatever multipliers.
+    /// Whether the QP is linearised at the iterate, with whatever multipliers.
     pub is_linearised: bool,
-    /// Whether the filter has the bound of violations that belongs to these slacks.
+    /// Whether the filter has the `θ_max` of the present slacks.
     pub filter_is_initialised: bool,
     /// The largest residual, relative to units and multipliers.
     pub nlp_error: f64,
-    /// That of the best iterate.
+    /// The largest residual of the best iterate.
     pub best_residual: f64,
-    /// That iterate.
+    /// The log row of the best iterate.
     pub best_iteration: Iteration,
-    /// Infeasible, where bounds contradict each other.
+    /// The status `Infeasible` of contradictory bounds.
     pub contradictory_bounds: Option<Status>,
-    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    /// Whether the run converged with the objective unit of the guess, and continues with a smaller
+    /// one.
     pub has_rescaled_objective: bool,
-    /// Where variables are larger, it is asked whether the problem is unbounded.
+    /// The size of variables above which the problem is tested for unboundedness.
     pub diverging_iterates_tol: f64,
 }
 
 impl<'c> RunState<'c> {
-    /// That of a run that begins.
+    /// The state at the start of a run.
     pub fn new(
         over: &'c mut dyn FnMut() -> bool,
         (lengths, capacity): (KktDimensions, KktDimensions),
         is_linearised: bool,
         options: &IpmOptions,
     ) -> Self {
-        // Products that do not vanish leave nothing to correct.
+        // Products that do not vanish cannot be predicted by an affine-scaling step.
         let barrier = if options.final_mu > 0.0 { Barrier::Monotone } else { options.barrier };
         Self {
             deadline_passed: over,
@@ -131,14 +132,14 @@ impl<'c> RunState<'c> {
         }
     }
 
-    /// Counts a step of this length.
+    /// Counts stalled steps: short ones, and steps of the restoration phase.
     pub fn count_stalled_step(&mut self, step: f64) {
         let stalls = self.restoration.outer_objective_unit.is_some() || step <= SHORT_STEP;
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
-    /// The next barrier parameter, from residuals and with a unit of products in which errors are
-    /// relative; another one has another filter.
+    /// Updates the barrier parameter from the residuals; complementarity is divided by `products`.
+    /// A new barrier parameter clears the filter.
     pub fn update_mu<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
@@ -146,14 +147,14 @@ impl<'c> RunState<'c> {
         options: &IpmOptions,
     ) {
         let objective_unit = self.dimensions.scaling.objective_unit;
-        let Inequalities { slack, multiplier, .. } = &iterate.sides;
+        let Inequalities { slack, multiplier, .. } = &iterate.inequalities;
         let error = |mu| {
             barrier::barrier_error(
                 residuals,
                 barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products,
             )
         };
-        let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let mean_complementarity = barrier::mean_complementarity(&iterate.inequalities) / objective_unit;
         let mu = objective_unit
             * self.adaptive_mu.update_mu(
                 self.mu / objective_unit,
@@ -167,8 +168,8 @@ impl<'c> RunState<'c> {
         }
     }
 
-    /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
-    /// that is all that is left, and stays, no smaller `μ` can make it less.
+    /// Stores the error of an iterate, and counts iterations in which complementarity stalls: with
+    /// the smallest `μ`, and all other residuals below the tolerance.
     pub fn update_nlp_error(&mut self, error: f64, error_without_complementarity: f64, options: &IpmOptions) {
         let (objective_unit, tolerance) = (self.dimensions.scaling.objective_unit, options.tolerance);
         let is_min_mu =
@@ -183,7 +184,7 @@ impl<'c> RunState<'c> {
         self.nlp_error = error;
     }
 
-    /// Whether multipliers hold slacks, which is said once.
+    /// Whether complementarity stalls; true at most once in a run.
     pub fn is_complementarity_stalled(&mut self) -> bool {
         let is_complementarity_stalled = self.complementarity_stall_iterations
             >= COMPLEMENTARITY_STALL_ITERATIONS
@@ -192,7 +193,8 @@ impl<'c> RunState<'c> {
         is_complementarity_stalled
     }
 
-    /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
+    /// Starts monotone mode for the rest of the run; slacks, multipliers and filter are initialised
+    /// again.
     pub fn begin_monotone_mode(&mut self, options: &IpmOptions) {
         self.adaptive_mu = AdaptiveMu::new(Barrier::Monotone);
         self.mu = options.scaled_start_mu(self.dimensions.scaling.objective_unit);

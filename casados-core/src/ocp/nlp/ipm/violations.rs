@@ -1,51 +1,49 @@
-//! What a feasibility phase makes small, and when it stays.
+//! Violations in the restoration phase, and their stationarity.
 
 use crate::ocp::assembly::units::ScalingUnits;
 use crate::qp::interior::{Iterate, at};
-use crate::qp::{Places, part};
+use crate::qp::{StageOffsetsIter, part};
 use crate::scalar::Real;
 
-/// Violations and gaps, in units, that are no more than this are none from which a run cannot go
-/// on.
+/// Violations and gaps, in units, up to which the restoration phase ends.
 pub(super) const SMALL_VIOLATION: f64 = 1e-4;
-/// Violations are there to stay where no step makes more than this part of them less, to first
-/// order.
+/// Violations are stationary if, to first order, no step reduces them by more than this fraction.
 const STATIONARY_DECREASE_RATIO: f64 = 1e-4;
-/// What is left of the dynamics by then, as a part of the violations.
+/// Gaps relative to violations up to which violations may be stationary.
 const CLOSED_GAP_RATIO: f64 = 1e-5;
-/// So many phases there may be in a run.
+/// The largest number of restoration phases in a run.
 pub(super) const MAX_RESTORATION_PHASES: usize = 4;
 
-/// What there is at an iterate, in units.
+/// Violations at an iterate, in units.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp::nlp) struct Violations {
-    /// Of hard bounds, which are soft in the phase.
+    /// The sum of violations of hard bounds, which are soft in the phase.
     violation_sum: f64,
-    /// By how much a point may be better that is no farther away than variables are large, to first
-    /// order: products of slacks and multipliers, of residuals and multipliers, of the gradient and
+    /// A bound, to first order, of the decrease within a distance of the size of the variables: the
+    /// products of slacks and multipliers, of residuals and multipliers, and of gradient and
     /// variables.
     max_first_order_decrease: f64,
     largest_gap: f64,
 }
 
-/// What is remembered of phases.
+/// State of the restoration phase.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp::nlp) struct RestorationPhase {
-    /// The unit of forces of the problem, while there is a phase.
+    /// The objective unit of the problem during the phase.
     pub outer_objective_unit: Option<f64>,
-    /// How many there were.
+    /// The number of restoration phases so far.
     pub phase_count: usize,
-    /// What there is in the phase.
+    /// The violations at the iterate of the phase.
     pub violations: Violations,
 }
 
 impl RestorationPhase {
-    /// Whether another phase may help.
+    /// Whether another restoration phase may start.
     pub fn may_enter(&self) -> bool {
         self.outer_objective_unit.is_none() && self.phase_count < MAX_RESTORATION_PHASES
     }
 
-    /// Takes what there is at an iterate with multipliers `π` of the dynamics.
+    /// Computes the violations at an iterate with multipliers `π` of the dynamics.
     pub fn update_violations<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
@@ -53,12 +51,16 @@ impl RestorationPhase {
         gaps: f64,
         units: ScalingUnits<'_, T>,
     ) {
-        let inequalities = &iterate.sides;
+        let inequalities = &iterate.inequalities;
         let product = |sum: f64, (&a, &b): (&T, &T)| sum + (a * b).abs().to_f64();
         let slacks = inequalities.slack.iter().zip(&*inequalities.multiplier).fold(0.0, product);
         let of_sides = inequalities.residual.iter().zip(&*inequalities.multiplier).fold(slacks, product);
-        let of_rows = inequalities.equation_residual.iter().zip(&*inequalities.free).fold(of_sides, product);
-        let mut max_decrease = Places::<T>::new(iterate.qp.dims).fold(of_rows, |sum, place| {
+        let of_rows = inequalities
+            .equation_residual
+            .iter()
+            .zip(&*inequalities.equation_multipliers)
+            .fold(of_sides, product);
+        let mut max_decrease = StageOffsetsIter::<T>::new(iterate.qp.dims).fold(of_rows, |sum, place| {
             let gaps = part(iterate.dynamics, place.dynamics, place.next);
             gaps.iter().zip(part(pi, place.dynamics, place.next)).fold(sum, product)
         });
@@ -82,12 +84,12 @@ impl RestorationPhase {
 }
 
 impl Violations {
-    /// Whether a run may go on.
+    /// Whether the run may leave the restoration phase.
     pub fn are_small(&self) -> bool {
         self.violation_sum <= SMALL_VIOLATION && self.largest_gap <= SMALL_VIOLATION
     }
 
-    /// Whether they are stationary.
+    /// Whether the violations are stationary.
     pub fn is_stationary(&self) -> bool {
         let Self { violation_sum: sum, max_first_order_decrease: better, largest_gap: gaps } = *self;
         sum > SMALL_VIOLATION && better <= STATIONARY_DECREASE_RATIO * sum && gaps <= CLOSED_GAP_RATIO * sum

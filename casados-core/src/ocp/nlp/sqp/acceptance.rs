@@ -1,36 +1,36 @@
-//! Whether a point is good enough: merit function and filter.
+//! Acceptance of trial points by merit function or filter.
 
 use super::options::Globalisation;
 use crate::ocp::nlp::filter::{ETA_PHI, Filter, FilterPair, switching_condition_holds};
 
-/// What a line search remembers.
+/// State of the line search, kept between iterations.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp::nlp) struct LineSearchState {
     pub filter: Filter,
-    /// Whether the last step was a full one: then the next full step is tried by linearising there,
-    /// which is not to be done again.
+    /// Whether the last step was a full one. Then the next full step is evaluated by linearising at
+    /// its end, and the linearisation is reused if it is accepted.
     pub last_step_was_full: bool,
-    /// Seconds of the linearisation at the iterate, if there is one.
+    /// Seconds of the linearisation at the iterate, if it has been done already.
     pub linearisation_seconds: Option<f64>,
 }
 
-/// A line search: where it begins, and what it expects.
+/// A linear model of the merit function along the direction.
 #[derive(Clone, Copy)]
 pub(in crate::ocp::nlp) struct MeritModel {
     pub current: FilterPair,
-    /// Of the objective.
+    /// The slope of the objective.
     pub slope: f64,
 }
 
 impl MeritModel {
-    /// Whether the merit function, if it is a parabola along the step, has its least before the end
-    /// of a step of this length: whether it shrinks by less than half of what its slope promises.
+    /// Whether the minimiser of the merit function, modelled as a parabola along the step, is
+    /// shorter than this step length: its decrease is less than half of the slope's prediction.
     pub fn overshoots(&self, length: f64, trial_pair: &FilterPair) -> bool {
         let predicted_decrease = length * (self.slope - self.current.violation);
         trial_pair.merit() - self.current.merit() > 0.5 * predicted_decrease.min(0.0) + self.rounding_noise()
     }
 
-    /// Near the solution, differences are roundings.
+    /// The rounding error of differences of the merit function.
     fn rounding_noise(&self) -> f64 {
         1e4 * f64::EPSILON * (1.0 + self.current.objective.abs() + self.current.violation)
     }
@@ -41,7 +41,7 @@ impl LineSearchState {
         Self { filter: Filter::new(f64::INFINITY), last_step_was_full: true, linearisation_seconds: None }
     }
 
-    /// Whether a point is good enough after a step of this length.
+    /// Whether the point at this step length is acceptable.
     pub fn accepts(
         &mut self,
         globalisation: Globalisation,

@@ -1,5 +1,5 @@
-//! The direction of a step: the QP at the iterate, regularised where it is not convex, with
-//! penalties where it is infeasible.
+//! The search direction: the QP at the iterate with inertia correction, in elastic mode if it is
+//! infeasible.
 
 use super::Sqp;
 use super::run_state::RunState;
@@ -14,34 +14,34 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;
 
-/// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
+/// The first QP is solved to all digits if the error of the gradient, in the user's units, could be
+/// larger than this.
 const MAX_FIRST_GRADIENT_ERROR: f64 = 1e-2;
-/// Penalties grow by this where the objective is what holds violations back.
+/// The growth of penalties if the objective keeps the violations from decreasing.
 const PENALTY_FACTOR: f64 = 100.0;
-/// Beside penalties of this multiple the objective counts nothing.
+/// The largest ratio of penalties to the option; at this ratio the objective is negligible.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
-/// QPs with hard bounds have this part of the iterations of QPs, and those with penalties so much
-/// of what is left.
+/// The shares of the remaining QP iterations for QPs with hard bounds, and for elastic QPs.
 const HARD_QP_ITERATION_SHARE: f64 = 0.35;
 const ELASTIC_QP_ITERATION_SHARE: f64 = 0.6;
-/// What rounding may leave of forces as large as one: no QP is solved to more digits.
+/// The relative rounding error of multipliers: QPs are solved to no more digits.
 const QP_ROUNDING: f64 = 1e-13;
-/// No direction makes violations smaller if the best one leaves this part of them.
+/// Violations are stationary if the best direction leaves at least this fraction of them.
 const STATIONARY_VIOLATION_RATIO: f64 = 1.0 - 1e-3;
-/// Gaps are closed that are no more than this part of the violations of bounds.
+/// Gaps count as closed up to this fraction of the violations of bounds.
 const CLOSED_GAP_RATIO: f64 = 1e-2;
-/// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
-/// are not closed any further: a step that closes them opens as large ones.
+/// The number of consecutive elastic steps after which gaps up to the violations of bounds are
+/// accepted: a step that closes them opens others of the same size.
 const MAX_GAP_CLOSING_STEPS: usize = 4;
-/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, and the
-/// digits of the QP, as parts of the penalty; then those of an easier QP.
+/// IPOPT's `resto_proximity_weight` and the accuracy of the QP, relative to the penalty; then those
+/// of an easier QP.
 const PROXIMITY_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
 
-/// What came of a QP.
+/// The outcome of a direction.
 pub(super) enum DirectionOutcome {
     /// A step.
     Step,
-    /// A proof that the sum of violations is stationary.
+    /// The sum of violations is proved to be stationary.
     LocallyInfeasible(Worst),
 }
 
@@ -50,7 +50,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.workspace.as_ref().get(ocp.ends()..saved_penalties_end(ocp)).unwrap_or_default()
     }
 
-    /// Penalties in place of hard bounds.
+    /// Replaces hard bounds by penalties.
     fn enter_elastic_mode<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -63,18 +63,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         ocp.set_penalties(memory, Some(T::from_f64(penalty)), &[]);
         state.is_elastic = true;
-        // Objectives with other penalties are not to be compared.
+        // Objectives with different penalties are not comparable.
         state.line_search.filter.clear();
     }
 
-    /// Bounds as they were given.
+    /// Restores the given bounds.
     pub(super) fn leave_elastic_mode<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut RunState<'_, T>,
     ) {
         if state.is_elastic {
-            // What is remembered is in units.
+            // The saved penalties are in units.
             self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
             ocp.set_penalties(self.saved_penalties(ocp), None, &[]);
             self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
@@ -83,7 +83,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The QP at the iterate; in elastic mode if it has no solution otherwise.
+    /// Computes the direction by the QP at the iterate, in elastic mode if it is infeasible.
     pub(super) fn compute_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -110,7 +110,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(direction)
     }
 
-    /// The same where the QP, the iterate and all constants are in units.
+    /// Computes the direction with QP, iterate and constants in units.
     fn compute_direction_in_units<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -125,7 +125,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (log_row.iteration > 0 || reduced);
         let relative_accuracy = self.options.qp_accuracy * state.residual_in_units;
-        // Without multipliers stationarity is the gradient, and says nothing of what is far away.
+        // Without multipliers the stationarity is the gradient, which may be far too large.
         let gradient_error = relative_accuracy * state.objective_unit();
         let is_inaccurate_start = log_row.iteration == 0
             && largest_multiplier == T::ZERO
@@ -134,9 +134,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if is_inaccurate_start || state.full_qp_accuracy { 0.0 } else { relative_accuracy };
         let rounding = if state.scaling.is_some() { ocp.gap_rounding_error() } else { 0.0 };
         self.qp_solver.permit(permitted_error.max(QP_ROUNDING * largest_multiplier.to_f64()).max(rounding));
-        // After a step with penalties hard bounds, whose QP had no solution, are not tried again as
-        // long as violations stay: a solution with penalties that violates nothing is one of
-        // theirs.
+        // After an elastic step whose violations remain the QP with hard bounds is omitted. An
+        // elastic solution without violations solves it.
         if core::mem::take(&mut state.reenter_elastic_mode) {
             return self.elastic_direction(ocp, state, log_row, None);
         }
@@ -155,11 +154,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.elastic_direction(ocp, state, log_row, Some(error))
     }
 
-    /// The step where bounds have penalties, since the QP had no solution; or that violations stay.
+    /// Computes an elastic step, or the verdict that violations are stationary.
     ///
     /// # Errors
-    /// `known`, the error of the QP with hard bounds, where that with penalties has no solution
-    /// either; that of the latter if there is none.
+    /// `hard_qp_error`, the error of the QP with hard bounds, if the elastic QP fails too; the
+    /// error of the elastic QP if there is none.
     fn elastic_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -170,7 +169,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        // What is violated and what is possible are compared: by exact solutions.
+        // Violations before and after the step are compared, which requires exact solutions.
         let penalty = self.options.elastic_penalty.max(state.required_penalty);
         self.enter_elastic_mode(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
@@ -179,7 +178,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let gaps = ocp.gap_sum();
         let current_violation = bound_violation + gaps;
         if let (Some(error), 0.0) = (hard_qp_error, current_violation) {
-            // Nothing is violated that penalties could stand for.
+            // There are no violations that penalties could reduce.
             return Err(error);
         }
         self.allot_qp_iterations(state, log_row, ELASTIC_QP_ITERATION_SHARE);
@@ -187,14 +186,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if current_violation == 0.0 {
                 return Err(error);
             }
-            // Without objective and curvature it is nearly a linear program.
+            // Without objective and curvature the QP is nearly a linear program.
             self.solve_feasibility_qp(ocp, state, log_row, current_violation)
                 .map_err(|_| hard_qp_error.unwrap_or(error))?;
             return Ok(Self::take_feasibility_step(state, log_row));
         }
         let remaining_violation = self.linearised_violation(ocp);
         if remaining_violation <= self.options.tolerance {
-            // It is the solution with hard bounds, too.
+            // The solution solves the QP with hard bounds, too.
             ocp.set_penalties(self.saved_penalties(ocp), None, &[]);
             (state.is_elastic, log_row.elastic) = (false, false);
             return Ok(DirectionOutcome::Step);
@@ -208,10 +207,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// What follows where penalties reduce violations of bounds and gaps by nothing: the QP that
-    /// minimises these alone tells whether larger penalties would (R. H. Byrd, J. Nocedal, R. A.
-    /// Waltz, "Steering exact penalty methods for nonlinear programming", Optim. Methods Softw. 23,
-    /// 2008).
+    /// Steering: if penalties do not decrease violations of bounds and gaps, a QP that minimises
+    /// only these determines whether larger penalties would (R. H. Byrd, J. Nocedal, R. A. Waltz,
+    /// "Steering exact penalty methods for nonlinear programming", Optim. Methods Softw. 23, 2008).
     fn steer_penalty<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -234,33 +232,34 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 return DirectionOutcome::LocallyInfeasible(worst);
             }
         }
-        // Gaps are to be closed first, whatever that leaves of bounds. The QP has another objective
-        // now, and is to be written again.
+        // Gaps are closed first, whatever violations of bounds remain. The objective of the QP was
+        // replaced: the QP must be written again.
         (state.qp_overwritten, state.required_penalty) = (true, 0.0);
         self.enter_elastic_mode(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.qp_solution, &mut self.trial_point);
         DirectionOutcome::Step
     }
 
-    /// QPs to come have a share of the iterations that are left.
+    /// Allots a share of the remaining iterations to the next QPs.
     fn allot_qp_iterations(&self, state: &mut RunState<'_, T>, log_row: &Iteration, share: f64) {
         let remaining_iterations = self.options.max_qp_iterations.saturating_sub(log_row.qp_iterations);
         state.qp_iteration_budget = log_row.qp_iterations + (share * remaining_iterations as f64) as usize;
     }
 
-    /// The step to the nearest point; the QP has another objective than that of the iterate.
+    /// Takes the feasibility step. The QP no longer has the objective of the iterate.
     fn take_feasibility_step(state: &mut RunState<'_, T>, log_row: &mut Iteration) -> DirectionOutcome {
         (state.is_feasibility_step, log_row.regularisation) = (true, 0.0);
         DirectionOutcome::Step
     }
 
-    /// The point that violates the linearisation least, near the iterate:
+    /// Computes the feasibility step, which minimises the violations of the linearisation near the
+    /// iterate:
     ///
     /// ```text
     /// min  θ(v) + ½ ε ‖v − v̄‖² / θ₀        θ: violations of bounds, θ₀: those at v̄, and gaps
     /// ```
     ///
-    /// Afterwards penalties are those beside which the objective counts nothing.
+    /// Afterwards the objective is negligible relative to the penalties.
     fn solve_feasibility_qp<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -270,7 +269,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<(), QpError> {
         let (base_penalty, dominant_penalty) =
             (self.options.elastic_penalty, MAX_PENALTY_FACTOR * self.options.elastic_penalty);
-        // Of soft bounds that were given there are costs.
+        // The given penalties of soft bounds are part of the objective.
         let soft = self.saved_penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { dominant_penalty } else { base_penalty };
         self.enter_elastic_mode(ocp, state, penalty);
@@ -288,7 +287,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The sum of violations that the solution of the QP leaves, by its linearisation.
+    /// Returns the sum of violations at the solution of the QP, by its linearisation.
     fn linearised_violation<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
         core::mem::swap(&mut ocp.iterate, &mut self.qp_solution);
         let (_, sum) = ocp.largest_hard_violation(self.saved_penalties(ocp), &[]);
@@ -296,7 +295,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         sum
     }
 
-    /// The QP with as much regularisation as it takes.
+    /// Solves the QP with damping and inertia correction.
     fn solve_regularised_qp<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -321,7 +320,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The QP from the iterate, with the iterations that are left of its share.
+    /// Solves the QP from the iterate, with the remaining iterations of its share.
     fn solve_qp<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -335,7 +334,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let iterations = log_row.qp_iterations;
             return Err(QpError::MaxIterations { iterations, residuals: log_row.residuals });
         }
-        // Without penalties there is no other way out: the solver is to say what it can.
+        // Without elastic mode the solver must not stop early.
         self.qp_solver.limit(self.options.elastic.then_some(remaining_iterations));
         let mut time_checks = 0;
         let over = &mut || {
@@ -351,7 +350,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 | QpError::Stalled { iterations, .. }
                 | QpError::OutOfTime { iterations, .. },
             ) => iterations,
-            // A solver asks in every iteration, and says no number where it finds such a QP.
+            // The solver calls `over` in every iteration; other errors have no iteration count.
             Err(_) => time_checks,
         };
         log_row.qp_iterations += used_iterations;

@@ -1,4 +1,4 @@
-//! How far a step goes.
+//! Line search.
 
 use super::Sqp;
 use super::acceptance::MeritModel;
@@ -15,24 +15,24 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
 
-/// Weights are at least this part of the largest multiplier: constraints without a force, as at
-/// states that cost nothing, would be left far behind otherwise.
+/// The smallest ratio of a weight to the largest multiplier. Constraints with zero multipliers, as
+/// of states without costs, would have arbitrary violations otherwise.
 const MIN_RELATIVE_WEIGHT: f64 = 1e-2;
-/// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
-/// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
-/// "Numerical Optimization", equation (18.36)).
+/// `ρ`: to first order the merit function decreases by at least this fraction of the weighted
+/// violations, also with negative curvature along the step (J. Nocedal, S. J. Wright, "Numerical
+/// Optimization", equation (18.36)).
 const RHO: f64 = 0.1;
-/// A step of Gauss and Newton that is no longer is refused where gaps and violations count more
-/// than the objective, if damping can be larger: a shorter step shrinks all linear gaps by the same
-/// part, a damped one goes less far in what would have to go farthest.
+/// Gauss-Newton steps up to this length are rejected in favour of damping, if weighted violations
+/// exceed the slope of the objective. A short step reduces all linear gaps by the same fraction; a
+/// damped direction reduces mainly the changes of the variables with the largest steps.
 const SHORTEST_UNDAMPED_STEP: f64 = 0.25;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short
-    /// enough.
+    /// Searches along the line from the iterate to the solution of its QP. Returns `None` if no
+    /// step above the shortest one is acceptable.
     ///
     /// # Errors
-    /// [`OcpError`] of the linearisation at the iterate, if that has to be repeated.
+    /// [`OcpError`] of a repeated linearisation at the iterate.
     pub(super) fn line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -60,7 +60,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if rejects_short_steps { 2.0 * SHORTEST_UNDAMPED_STEP } else { self.options.shortest_step };
         let mut length = 1.0;
         while length >= shortest {
-            // A point without a value is one that is not good enough.
+            // A point with a non-finite function is rejected.
             let trial_pair = self.evaluate_trial(ocp, state, length);
             if let Some(trial_pair) = trial_pair
                 && state.line_search.accepts(globalisation, length, &model, &trial_pair)
@@ -84,18 +84,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(None)
     }
 
-    /// Weights of violations before the first line search: those of a filter are the inverses of
-    /// units and stay.
+    /// Initialises the weights of violations before the first line search. The weights of a filter
+    /// are the inverses of units, and constant.
     pub(super) fn reset_weights<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &RunState<'_, T>) {
         let uses_merit_function = state.globalisation(&self.options) == Globalisation::Merit;
         self.violation_weights.multipliers_mut().fill(if uses_merit_function { T::ZERO } else { T::ONE });
         if !uses_merit_function {
-            // The solution is written before it is read.
+            // The QP solution is written before it is read.
             self.scale_weights(ocp, state, ScalingDirection::Unscale);
         }
     }
 
-    /// What there is at a part of the step, if it has a value.
+    /// Returns objective and weighted violation at a step length, if they are finite.
     fn evaluate_trial<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -116,7 +116,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             .map(|there| there.divided_by(state.objective_unit()))
     }
 
-    /// Whether a step that is good enough may be better where it is shorter.
+    /// Whether a shorter step may decrease the merit function further.
     fn should_shorten(
         &self,
         state: &RunState<'_, T>,
@@ -128,8 +128,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         uses_merit_function && model.overshoots(length, trial_pair)
     }
 
-    /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
-    /// function says that its least is before, and shrinks. The length.
+    /// Takes an accepted step, or half, a quarter, … of it: while its model has a shorter
+    /// minimiser, and the merit function decreases. Returns the step length.
     fn backtrack_to_minimiser<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -156,7 +156,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         length
     }
 
-    /// The line from the iterate to the solution of the QP, with new weights of violations.
+    /// Updates the weights of violations, and returns the merit model.
     fn merit_model<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -169,8 +169,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Objective and weighted violations at the iterate, with new weights, and the slope of the
-    /// objective.
+    /// Updates the weights. Returns objective and weighted violations at the iterate, and the slope
+    /// of the objective.
     fn update_weights<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -186,7 +186,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let multipliers = self.qp_solution.multipliers_mut();
         let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
         let (half, least) = (T::from_f64(0.5), T::from_f64(MIN_RELATIVE_WEIGHT) * largest);
-        // Those of this step count at least.
+        // Weights are at least the multipliers of this step.
         self.violation_weights.update_multipliers(&self.qp_solution, |w, multiplier| {
             let size = multiplier.abs();
             size.max(half * (w + size)).max(least)
@@ -203,7 +203,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (ocp.objective_and_violation(&self.violation_weights), slope)
     }
 
-    /// The full step, tried by linearising there.
+    /// Tries the full step by linearising at its end.
     fn try_full_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -233,7 +233,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         false
     }
 
-    /// The full step, with constraints corrected by their values at its end: they bend away.
+    /// Tries a full step with second-order correction: with the constraint values at the end of the
+    /// full step.
     fn try_second_order_correction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -248,7 +249,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let ends = self.workspace.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         ocp.set_second_order_correction(&self.trial_point, ends);
         self.trial_point.copy_from(&self.qp_solution);
-        // It is the trial that is solved for, and scaled back.
+        // The trial point takes the solution, and is scaled back.
         core::mem::swap(&mut self.qp_solution, &mut self.trial_point);
         self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
         self.qp_solver.limit(Some(remaining_iterations));
@@ -276,7 +277,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// `a + length (b − a)` of everything.
+/// Computes `a + length (b − a)` of all variables and multipliers.
 fn interpolate_points<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     a: &Solution<T, D, M>,
     b: &Solution<T, D, M>,

@@ -1,4 +1,4 @@
-//! Objective and violations at a point, and what a QP says of both.
+//! Objective and weighted violations at a point, and their slope along the step.
 
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
@@ -10,8 +10,8 @@ use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, copy_
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
-    /// change of `penalties`.
+    /// Returns `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, plus
+    /// the change of the `penalties`.
     pub(in crate::ocp) fn objective_slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
         let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let (from, _) = iterate.variables_and_costates();
@@ -43,7 +43,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         slope.to_f64() + soft
     }
 
-    /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
+    /// Returns `dᵀ H d / dᵀ d` along the step from the iterate to the solution of its QP.
     pub(super) fn curvature_along_step(&mut self, solution: &Solution<T, D, M>) -> f64 {
         let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let ((from, _), (to, _)) = (iterate.variables_and_costates(), solution.variables_and_costates());
@@ -66,10 +66,10 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         (curvature / square).to_f64()
     }
 
-    /// Objective and violations at some point, with the weights of violations.
+    /// Returns objective and weighted violations at a point.
     ///
     /// # Errors
-    /// Those of functions and integrators.
+    /// The errors of functions and integrators.
     pub(in crate::ocp) fn objective_and_violation_at(
         &mut self,
         trial_point: &Solution<T, D, M>,
@@ -104,7 +104,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         Ok(sum)
     }
 
-    /// The sum of the gaps between intervals at the iterate, from the QP that was written there.
+    /// Returns the sum of the gaps at the iterate, from the QP that was written there.
     pub(super) fn gap_sum(&self) -> f64 {
         let (v, _) = self.iterate.variables_and_costates();
         let (mut sum, mut begin) = (0.0, 0);
@@ -123,7 +123,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         sum
     }
 
-    /// [`Ocp::measure`] at the iterate, from the QP that was written there.
+    /// Returns [`Ocp::objective_and_violation_at`] of the iterate, from the QP that was written
+    /// there.
     pub(in crate::ocp) fn objective_and_violation(&self, weights: &Solution<T, D, M>) -> FilterPair {
         let mut sum = FilterPair { objective: self.objective.to_f64(), violation: 0.0 };
         let (v, _) = self.iterate.variables_and_costates();
@@ -150,7 +151,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 }
 
-/// The weighted size of a gap between two intervals.
+/// The weighted size of a gap.
 fn weighted_gap<T: Real>(weights: Option<&SolutionStage<'_, T>>, index: usize, gap: T) -> f64 {
     let weight = weights.map_or(1.0, |w| w.dynamics.get(index).map_or(0.0, |w| w.to_f64()));
     weight * gap.abs().to_f64()
@@ -169,7 +170,7 @@ fn variable_bound_terms<T: Real>(
     sum
 }
 
-/// Penalties and violations of some bounds.
+/// Penalties and violations of several bounds.
 fn bound_terms<T: Real>(
     bounds: &Bounds<'_, T>,
     value: impl Fn(usize) -> T,
@@ -182,7 +183,7 @@ fn bound_terms<T: Real>(
     sum
 }
 
-/// Those of one.
+/// Penalty and violation of one pair of bounds.
 fn bound_term<T: Real>(
     bounds: &Bounds<'_, T>,
     index: usize,

@@ -6,11 +6,11 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `multipliers` | the first multipliers, where costs have no curvature |
-//! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
-//! | `search` | how far a step goes, by what `measure` finds at trial points |
-//! | `scaled` | the QP in units |
-//! | `run` | the iterations, and how they end |
+//! | `multipliers` | least-squares multipliers, where costs have no curvature |
+//! | `direction` | the QP: inertia correction, elastic mode |
+//! | `line_search` | the step length, by the `merit_function` or a filter (`acceptance`) |
+//! | `scaling` | the QP in units |
+//! | `run` | the iterations, and the end of a run |
 //! | `restart` | the second attempt, from a simulation |
 
 mod acceptance;
@@ -39,18 +39,18 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`Exact`], or
-/// [`GaussNewton`] after [`Sqp::gauss_newton`].
+/// Sequential quadratic programming with the QP solver `S` and the Hessian `C`: [`Exact`], or
+/// [`GaussNewton`] by [`Sqp::gauss_newton`].
 ///
-/// Exact Hessians converge whatever the costs are. That of Gauss and Newton is cheaper, needs no
-/// second derivatives of dynamics, and converges about as fast where costs are least squares whose
-/// residuals are small at the solution, as in tracking; elsewhere it may not converge at all.
+/// Exact Hessians converge for all costs. Gauss-Newton Hessians are cheaper and need no second
+/// derivatives of the dynamics. They converge about as fast if costs are least squares with small
+/// residuals at the solution, as in tracking; otherwise they may diverge.
 ///
-/// Memory is made for one problem, of whose dimensions all others are to be.
+/// The memory is that of one problem; other problems must have the same dimensions.
 ///
 /// # Errors
-/// [`OcpError`] where there is nothing to go on with: data that make no sense, or dynamics that
-/// cannot be integrated at the first iterate. How a run ended otherwise is the `status` of its
+/// [`OcpError`] if a run cannot start: invalid data, or dynamics that cannot be integrated at the
+/// first iterate. Otherwise the end of the run is the `status` of its
 /// [`Outcome`](crate::ocp::Outcome).
 ///
 /// # Example
@@ -78,31 +78,31 @@ use alloc::vec::Vec;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Sqp<S, C, T, D, M> {
-    /// Options, which may be changed between calls.
+    /// Options, which may be changed between runs.
     pub options: SqpOptions,
     /// The Hessian.
     pub curvature: C,
-    /// The solver of QPs.
+    /// The QP solver.
     pub qp_solver: S,
     /// The solution of a QP.
     qp_solution: Solution<T, D, M>,
-    /// A point that is tried.
+    /// The trial point of the line search.
     trial_point: Solution<T, D, M>,
     /// The best iterate.
     best_iterate: Solution<T, D, M>,
-    /// The weights of constraints in the merit function, in the places of their multipliers; in
-    /// those of variables the guess.
+    /// The weights of constraints in the merit function, in place of their multipliers. Its
+    /// variables store the guess.
     violation_weights: Solution<T, D, M>,
-    /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
-    /// exchanges, then units of rows.
+    /// Ends of intervals and constraints at trial points, then the saved penalties, then the units
+    /// of rows.
     workspace: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,
 }
 
-/// Sequential quadratic programming with its memory on the heap.
+/// Sequential quadratic programming with memory on the heap.
 ///
-/// `HeapSqp::new(&ocp)?` makes it; [`Sqp`] has its methods, and an example.
+/// Created by `HeapSqp::new(&ocp)?`; [`Sqp`] has the methods, and an example.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -129,7 +129,7 @@ pub type HeapSqp<S = HeapInteriorPoint, C = Exact, T = f64> = Sqp<S, C, T, Vec<S
 
 #[cfg(feature = "alloc")]
 impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
-    /// For a problem, with the library's own solver of QPs and exact Hessians.
+    /// Creates a solver for a problem, with the library's QP solver and exact Hessians.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -137,7 +137,7 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
         ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
     ) -> Result<Self, OcpError> {
         let mut solver = HeapInteriorPoint::new();
-        // QPs come in units.
+        // QPs are scaled already.
         solver.options.scaling = false;
         Self::with_solver(ocp, solver)
     }
@@ -145,7 +145,7 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
 
 #[cfg(feature = "alloc")]
 impl<S, T: Real> HeapSqp<S, Exact, T> {
-    /// For a problem, with exact Hessians and a solver of QPs, such as
+    /// Creates a solver for a problem, with exact Hessians and a given QP solver, such as
     /// [`Condensing`](crate::qp::Condensing).
     ///
     /// # Errors
@@ -173,7 +173,7 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
 
 #[cfg(feature = "alloc")]
 impl<S, C, T: Real> HeapSqp<S, C, T> {
-    /// The iterations of the last run, to be printed.
+    /// The iterations of the last run, for printing.
     #[must_use]
     pub fn log(&self) -> Log<'_> {
         Log(&self.log)
@@ -181,13 +181,13 @@ impl<S, C, T: Real> HeapSqp<S, C, T> {
 }
 
 impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
-    /// The same with the Hessian of the Lagrangian, and another way to make it convex.
+    /// Replaces the Hessian by that of the Lagrangian with the given convexification.
     #[must_use]
     pub fn exact(self, curvature: Exact) -> Sqp<S, Exact, T, D, M> {
         self.with_curvature(curvature)
     }
 
-    /// The same with the Hessian of Gauss and Newton.
+    /// Replaces the Hessian by the Gauss-Newton Hessian.
     #[must_use]
     pub fn gauss_newton(self) -> Sqp<S, GaussNewton, T, D, M> {
         self.with_curvature(GaussNewton::default())
@@ -210,7 +210,7 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
 }
 
 impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
-    /// How many numbers it takes for a problem; `usize::MAX` if they are more than that.
+    /// Returns the length of the memory for a problem; `usize::MAX` on overflow.
     #[must_use]
     pub const fn memory<P: Program<T>>(dims: &[StageDims]) -> usize {
         Solution::<T, (), ()>::memory(dims)
@@ -220,7 +220,8 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
             .saturating_add(scaling::unit_memory_len::<T>(dims))
     }
 
-    /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
+    /// Creates a solver for problems of these dimensions, in given memory of [`Sqp::memory`]
+    /// numbers.
     ///
     /// # Errors
     /// [`OcpError::Length`]

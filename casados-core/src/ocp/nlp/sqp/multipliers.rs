@@ -1,12 +1,13 @@
-//! The first multipliers, where costs leave controls without curvature.
+//! Least-squares multipliers, where costs leave controls without curvature.
 //!
 //! ```text
 //! min_π  ‖∇f + Jᵀπ‖        J: dynamics and equations        by        min_d  ½ ε ‖d‖² + ∇fᵀd        c + J d = 0
 //! ```
 //!
-//! whose multipliers are those of least squares but for a part `ε` that `c` adds (A. Wächter, L. T.
-//! Biegler, Math. Program. 106, 2006, section 3.6). Without them the first QP would be a linear
-//! program: its Hessian would know nothing of the dynamics, and its solution is far away.
+//! The multipliers of the second problem are the least-squares multipliers up to an error of `ε`
+//! (A. Wächter, L. T. Biegler, Math. Program. 106, 2006, section 3.6). Without initial multipliers
+//! the first QP would be a linear program, whose Hessian lacks the dynamics and whose solution is
+//! far away.
 
 use super::Sqp;
 use super::run_state::RunState;
@@ -20,14 +21,15 @@ use crate::scalar::Real;
 
 /// `ε`
 const PROXIMAL_WEIGHT: f64 = 1e-6;
-/// First multipliers that are larger are discarded.
+/// The largest initial multiplier; if one is larger, all are discarded.
 const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// Writes them to the iterate that was linearised, if it has none, and linearises it again.
+    /// Writes least-squares multipliers to the linearised iterate if it has no multipliers, and
+    /// linearises it again.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`].
+    /// The errors of [`Ocp::linearise`].
     pub(super) fn least_squares_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -66,12 +68,12 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         })
     }
 
-    /// `½ ε ‖v − v̄‖²` as the objective of the QP at the iterate `v̄`.
+    /// Sets the objective of the QP at the iterate `v̄` to `½ ε ‖v − v̄‖²`.
     pub(super) fn set_pure_proximal_objective(&mut self, weight: T) {
         self.set_proximal_objective(weight, T::ZERO);
     }
 
-    /// `½ ε ‖v − v̄‖² + s ∇fᵀv` as the objective of the QP at the iterate `v̄`.
+    /// Sets the objective of the QP at the iterate `v̄` to `½ ε ‖v − v̄‖² + s ∇fᵀv`.
     fn set_proximal_objective(&mut self, weight: T, gradient_factor: T) {
         let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;

@@ -1,8 +1,8 @@
-//! What can be chosen.
+//! Options of sequential quadratic programming.
 
 use crate::ocp::formulation::error::OcpError;
 
-/// How far a step goes.
+/// The choice of the step length.
 ///
 /// ```
 /// use casados::ocp::{Globalisation, SqpOptions};
@@ -12,30 +12,31 @@ use crate::ocp::formulation::error::OcpError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Globalisation {
-    /// All the way, always.
+    /// Full steps, without globalisation.
     FullStep,
-    /// As far as the merit function `f + Σ ν_i |c_i|` shrinks as it should, with second-order
-    /// correction. Each constraint has a weight of its own, which follows its multiplier:
-    /// `ν_i ← max(|λ_i|, ½ (ν_i + |λ_i|), 0.01 max |λ|)` (M. J. D. Powell, "A fast algorithm for
-    /// nonlinearly constrained optimization calculations", 1978, and a bound from below). Where the
-    /// step is no direction of descent all of them grow until it is. A step along which the merit
-    /// function shrinks by less than half of what its slope promises is halved as long as that is
-    /// better: the least of a parabola is before its end. Near a solution
-    /// full steps are what it accepts: the linearisation there is that of the next iteration. With
-    /// the Hessian of Gauss and Newton, and after a first attempt that failed, steps of a quarter
-    /// or less give way to damped ones while weighted gaps are more than what the objective changes
-    /// by. With exact Hessians the filter decides from then on where five steps more were a
-    /// sixteenth or less than full ones without a correction.
+    /// Line search with the merit function `f + Σ ν_i |c_i|`, and second-order correction.
+    ///
+    /// Each constraint has its own weight, `ν_i ← max(|λ_i|, ½ (ν_i + |λ_i|), 0.01 max |λ|)` (M. J.
+    /// D. Powell, "A fast algorithm for nonlinearly constrained optimization calculations", 1978,
+    /// with a lower bound). All weights grow until the step is a descent direction. A step whose
+    /// decrease is less than half of the slope's prediction is halved while that decreases the
+    /// merit function further. Near a solution full steps are accepted, and evaluated by the
+    /// linearisation of the next iteration.
+    ///
+    /// With Gauss-Newton Hessians, and after a restart, steps of at most a quarter are replaced by
+    /// damped ones while weighted violations exceed the slope of the objective. With exact Hessians
+    /// the filter replaces the merit function when steps of at most 1/16 outnumber full steps
+    /// without correction by five.
     #[default]
     Merit,
-    /// As far as objective or violation shrink compared to all iterates before, with second-order
-    /// correction.
+    /// Line search with a filter: objective or violation must decrease relative to all earlier
+    /// iterates. With second-order correction.
     Filter,
 }
 
 /// Options of [`Sqp`](super::Sqp).
 ///
-/// A later version may have more fields: change those of a solver, or write
+/// Later versions may have more fields: change the options of a solver, or write
 /// `..SqpOptions::new::<f64>()`.
 ///
 /// ```
@@ -46,50 +47,51 @@ pub enum Globalisation {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SqpOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Where
-    /// units are above 100 it is this times a hundredth of them, where they are below 0.01 it is
-    /// this times the unit ([`scaling`](Self::scaling)). Default 1e-6; of single precision 1e-3.
+    /// The run converges when all four [`Residuals`](crate::qp::Residuals) are at most this;
+    /// positive. For units above 100 the tolerance is multiplied by a hundredth of the unit, for
+    /// units below 0.01 by the unit ([`scaling`](Self::scaling)). Default 1e-6, in single precision
+    /// 1e-3.
     pub tolerance: f64,
-    /// After so many iterations a run ends with
-    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations) and the best iterate. With zero
-    /// the start is judged alone. Default 200.
+    /// The largest number of iterations; then the status is
+    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations), with the best iterate. With
+    /// zero only the start is tested. Default 200.
     pub max_iterations: usize,
-    /// Default [`Globalisation::Merit`].
+    /// The choice of the step length. Default [`Globalisation::Merit`].
     pub globalisation: Globalisation,
-    /// Whether QPs begin at the solution of the one before. Default true.
+    /// Whether QPs start from the solution of the last QP. Default true.
     pub warm_start: bool,
-    /// QPs are solved to this part of the largest residual, if that is more than the solver's own
-    /// tolerance: what the linearisation is off by is more. They are solved to all digits where a
-    /// run begins without multipliers and gradients might be wrong by more than 1e-2, where no
-    /// step makes progress otherwise, and in a second attempt. From 0 to 1, default 1e-4.
+    /// The accuracy of QPs relative to the largest residual, if that is coarser than the tolerance
+    /// of the QP solver; the error of the linearisation is larger. QPs are solved to all digits in
+    /// the first iteration without multipliers if the error of the gradient could exceed 1e-2,
+    /// after a failed step, and after a restart. From 0 to 1, default 1e-4.
     pub qp_accuracy: f64,
-    /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default
-    /// true.
+    /// Whether elastic mode is on: penalties of bounds of states and constraints while the QP is
+    /// infeasible. Default true.
     pub elastic: bool,
-    /// These penalties, linear; positive. Default 1e3.
+    /// The linear penalty of elastic mode; positive. Default 1e3.
     pub elastic_penalty: f64,
-    /// Whether constants, tolerances and QPs are in units, found where a run begins, as
-    /// [`IpmOptions::scaling`](crate::ocp::IpmOptions::scaling) says; but that of forces is one,
-    /// too, from 0.01 to 100, and all are powers of two. The log and residuals are in the units of
-    /// the problem. Default true.
+    /// Whether constants, tolerances and QPs are in units, computed at the start of a run as
+    /// described at [`IpmOptions::scaling`](crate::ocp::IpmOptions::scaling); but the unit of the
+    /// objective, too, is one from 0.01 to 100, and all units are powers of two. The log and
+    /// residuals are in the units of the problem. Default true.
     pub scaling: bool,
-    /// QPs of an iteration have at most so many iterations, in sum: a third of them with hard
-    /// bounds, then with penalties, then for the least violations. Where they are not solved
-    /// by then the iterate stays, and the next iteration tries another QP. Default 100; at least 4.
+    /// The largest number of QP iterations in one iteration: a third for the QP with hard bounds,
+    /// then for the elastic QP and for the feasibility step. If no QP is solved the iterate is
+    /// unchanged, and the next iteration tries another QP. Default 100; at least 4.
     pub max_qp_iterations: usize,
-    /// The shortest step of a line search; above 0, at most 1. Default 1e-6.
+    /// The shortest step length of a line search; above 0, at most 1. Default 1e-6.
     pub shortest_step: f64,
-    /// Whether a run begins at a point beside a guess at which the gradient of a violated
-    /// constraint vanishes: its linearisation says nothing of where it holds. Default true.
+    /// Whether a guess is perturbed at which the gradient of a violated constraint vanishes, since
+    /// its linearisation has no solution. Default true.
     pub perturb_start: bool,
-    /// Whether a run that fails, or leads nowhere for long, begins once more: at a simulation with
-    /// the controls of the guess, or beside it where violations are still those of the guess.
-    /// Default true.
+    /// Whether a run that fails or stalls restarts once: from a simulation with the controls of the
+    /// guess, or with perturbed controls if the violations are still those of the guess. Default
+    /// true.
     pub restart: bool,
 }
 
 impl SqpOptions {
-    /// For numbers of some precision.
+    /// The defaults for a number type.
     #[must_use]
     pub fn new<T: crate::scalar::Real>() -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! A second attempt, from a simulation with the controls of the guess.
+//! Restart from a simulation with the controls of the guess.
 
 use super::Sqp;
 use super::run_state::RunState;
@@ -14,14 +14,14 @@ use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, nan_max};
 use crate::scalar::Real;
 
-/// The regularisation of the first direction.
+/// The Levenberg-Marquardt damping of the first direction after a restart.
 const RESTART_DAMPING: f64 = 1.0;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// Whether a run begins again, with steps that are damped as those of Gauss and Newton are:
-    /// once, where it failed, or has had penalties for long and a simulation with the controls of
-    /// the guess violates less than its iterate. It was long steps at first that led astray, or
-    /// gaps that were to be closed over unstable dynamics.
+    /// Restarts a run at most once, with damped steps as for Gauss-Newton Hessians: after a
+    /// failure, or after many elastic steps if a simulation with the controls of the guess violates
+    /// less than the iterate. Long first steps, or closing gaps over unstable dynamics, may have
+    /// caused the failure. Returns whether it restarts.
     pub(super) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -57,7 +57,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if is_infeasible
             && simulated_violation.is_some_and(|violation| guess_violation_range.contains(&violation))
         {
-            // Where nothing was gained from the guess it may be a maximum of violations.
+            // A guess whose violations did not decrease may be a maximum of them.
             simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::PerturbedSimulation);
         }
         if stalls
@@ -75,7 +75,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             ocp.iterate.copy_from(&self.violation_weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
         }
-        // The best iterate may be that of the first attempt, after the second one, too.
+        // The best iterate of both attempts is kept.
         let &mut RunState { scaling: sizes, best_residual, best_iteration, .. } = state;
         let over = state.deadline_passed.take();
         let fresh_state = RunState { best_residual, best_iteration, ..RunState::new() };
@@ -90,8 +90,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         true
     }
 
-    /// Makes a simulation with the controls of the guess the iterate and linearises there; what was
-    /// the iterate is a trial then. What it violates, if it has values.
+    /// Simulates the states with the controls of the guess, makes the result the iterate and
+    /// linearises there; the trial point becomes the last iterate. Returns the violation of the
+    /// simulation, if it is finite.
     fn linearise_simulated_guess<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -103,7 +104,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.trial_point.copy_from(&self.violation_weights);
         self.trial_point.multipliers_mut().fill(T::ZERO);
         let ends = self.workspace.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if P::LIFTED || !ocp.simulate_guess(&mut self.trial_point, ends, start) {
+        if ocp.problem.is_lifted() || !ocp.simulate_guess(&mut self.trial_point, ends, start) {
             return None;
         }
         if ocp.linearise(self.curvature).is_err() {
@@ -114,7 +115,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The largest violation, of equations and of inequalities.
+/// The largest violation of equations and inequalities.
 pub(super) fn primal_infeasibility(residuals: &Residuals) -> f64 {
     nan_max(residuals.dynamics, residuals.inequalities)
 }

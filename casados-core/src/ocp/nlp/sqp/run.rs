@@ -1,4 +1,4 @@
-//! The iterations.
+//! Entry points, iterations and end of a run.
 
 use super::Sqp;
 use super::direction::DirectionOutcome;
@@ -23,12 +23,12 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-/// The log has room for so many iterations before it grows.
+/// The initial capacity of the log, in iterations.
 #[cfg(feature = "alloc")]
 const LOG_CAPACITY: usize = 64;
 
-/// After so many steps with penalties in a row it is the sum of violations that is made small, and
-/// its curvature counts.
+/// The number of consecutive elastic steps after which multipliers are no longer set to zero: the
+/// iterations minimise the sum of violations, and need its curvature.
 const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
 const ATTEMPTS: [Attempt; 5] = [
@@ -41,14 +41,14 @@ const ATTEMPTS: [Attempt; 5] = [
 const MAX_ATTEMPT_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
-    /// With exact Hessians, without multipliers and without costs that curve in all controls, it
-    /// begins with the multipliers of least squares.
+    /// Solves a problem from its iterate. Afterwards the iterate is the best one, whatever the
+    /// status, or the last one after `Converged` and `Infeasible`. With exact Hessians the run
+    /// starts with least-squares multipliers if there are none and costs leave a control without
+    /// curvature.
     ///
     /// # Errors
-    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
-    /// full steps went to a point at which something has no value: then the iterate is the best
-    /// one, too.
+    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] if full
+    /// steps lead to a point where a function is not finite; the iterate is the best one then, too.
     pub fn solve<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
@@ -56,7 +56,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.solve_observed(ocp, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// As [`Sqp::solve`], with an observer of the iterations that may stop the run.
+    /// [`Sqp::solve`] with an observer of the iterations, which may stop the run.
     ///
     /// # Errors
     /// As [`Sqp::solve`].
@@ -71,9 +71,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.run(ocp, observer, &mut || false)
     }
 
-    /// As [`Sqp::solve`], until the time is over: `over`, a clock or a counter of cycles, is asked
-    /// after each linearisation, and in every iteration of a QP, as far as its solver makes use of
-    /// that. Then the status is [`Status::OutOfTime`], and the iterate the best one.
+    /// [`Sqp::solve`] with a deadline: `over` is called after each linearisation, and in every
+    /// iteration of a QP whose solver supports it; it may read a clock or a counter of cycles. When
+    /// it returns true the status is [`Status::OutOfTime`], and the iterate the best one so far.
     ///
     /// # Errors
     /// As [`Sqp::solve`].
@@ -126,7 +126,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             contradictory_bounds: contradiction,
             ..RunState::new()
         };
-        // Steps are to solutions of QPs: what is one stays so.
+        // Solutions of QPs satisfy the coupling; so must the first iterate.
         ocp.equalise_shared_controls();
         ocp.equalise_periodic_states();
         self.violation_weights.copy_from(&ocp.iterate);
@@ -143,7 +143,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if is_stuck && state.has_rescaled_objective {
             outcome.status = Status::Acceptable;
         }
-        // What is infeasible is said of the last iterate.
+        // The verdict `Infeasible` holds at the last iterate.
         let is_last =
             matches!(outcome.status, Status::Converged | Status::Infeasible { .. }) && result.is_ok();
         if !is_last && state.best_residual.is_finite() {
@@ -155,7 +155,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result.map(|()| outcome)
     }
 
-    /// Lets the filter decide from now on where the merit function creeps.
+    /// Replaces the merit function by the filter after too many short steps.
     fn switch_to_filter<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -170,7 +170,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The curvature of the QP along its step, of which the iterate has gone a part.
+    /// The curvature of the QP along its step, after a part of the step has been taken.
     fn curvature_of_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -182,7 +182,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         curvature
     }
 
-    /// The full step, or one that a line search finds.
+    /// Takes the full step, or a step of the line search.
     fn take_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -199,8 +199,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Some(AcceptedStep { length: 1.0, corrected: false }))
     }
 
-    /// A step in the direction of the QP; nothing where none is short enough, or the QP has no
-    /// solution.
+    /// Attempts a step in the direction of the QP. Continues with `None` if the line search fails
+    /// or the QP is not solved.
     fn attempt_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -242,8 +242,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(ControlFlow::Continue(None))
     }
 
-    /// The iterate stays, and the next iteration tries another QP there; how the run ends if there
-    /// is none.
+    /// Selects the next attempt at the same iterate. Returns a status if there is none.
     fn select_next_attempt<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -265,7 +264,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         });
         let Some(next) = next else {
             return Ok(Some(match failure {
-                // That the QP at one iterate has no solution says nothing of the problem.
+                // An infeasible QP at one iterate does not prove that the problem is infeasible.
                 None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
                 Some(error) => ocp.qp_failure_status(error)?,
             }));
@@ -273,7 +272,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state.attempt = next;
         state.line_search.linearisation_seconds = None;
         if failure.is_some() {
-            // The curvature that multipliers have is no help.
+            // The curvature due to multipliers may have caused the failure.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
         }
         Ok(None)
@@ -298,7 +297,7 @@ where
         log_row: &mut Iteration,
     ) -> Result<(), OcpError> {
         match state.line_search.linearisation_seconds.take() {
-            // The line search has linearised here already.
+            // The line search has linearised at this iterate already.
             Some(seconds) => log_row.times.linearise = seconds,
             None if log_row.iteration == 0 => {
                 let curvature = self.curvature;
@@ -379,8 +378,8 @@ where
             && C::EXACT
             && (state.is_feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
         {
-            // On the way to a feasible point forces of penalties are no multipliers: curvatures
-            // would be far too large.
+            // Far from feasible points multipliers are as large as the penalties, and would make
+            // the curvature far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
             state.line_search.linearisation_seconds = None;
             self.reset_weights(ocp, state);
@@ -397,7 +396,7 @@ where
     ) -> bool {
         let restarts = self.try_restart(ocp, state, final_status, log_row);
         if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
-            // That is said of the last iterate.
+            // The verdict holds at the last iterate.
             state.best_iteration = *log_row;
         }
         restarts

@@ -1,4 +1,4 @@
-//! What a run remembers.
+//! State of a run.
 
 use super::acceptance::LineSearchState;
 use super::options::{Globalisation, SqpOptions};
@@ -10,94 +10,95 @@ use crate::qp::QpError;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
-/// What a step tries, where no step along the direction before is short enough.
+/// The attempts at an iterate, in this order until a step is accepted.
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::ocp::nlp) enum Attempt {
-    /// The QP to as many digits as the iterate deserves.
+    /// The QP is solved to an accuracy relative to the residuals.
     First,
-    /// To all of them: it may have been wrong by more than a step gains.
+    /// The QP is solved to all digits: its error may have exceeded the gain of a step.
     FullAccuracy,
-    /// With at least so much regularisation.
+    /// The QP has at least this Levenberg-Marquardt damping.
     Damped(f64),
 }
 
-/// What a run remembers from one iteration to the next.
+/// State of a run, kept between iterations.
 pub(in crate::ocp::nlp) struct RunState<'c, T> {
-    /// Whether the time is over.
+    /// Returns whether the deadline has passed.
     pub deadline_passed: Option<&'c mut dyn FnMut() -> bool>,
-    /// Whether it was.
+    /// Whether the deadline has passed.
     pub out_of_time: bool,
-    /// Nothing has been done yet.
+    /// Whether the run has not evaluated its first iterate.
     pub is_run_start: bool,
-    /// The run began again.
+    /// Whether the run has restarted.
     pub second_attempt: bool,
     pub line_search: LineSearchState,
-    /// Whether bounds have penalties.
+    /// Whether bounds have penalties (elastic mode).
     pub is_elastic: bool,
     pub inertia_correction: InertiaCorrection,
-    /// The least regularisation, where steps without were too far from being one of descent.
+    /// Levenberg-Marquardt damping: the smallest regularisation of the next direction.
     pub damping: f64,
-    /// The regularisation of the last step that was short, and less after others.
+    /// The regularisation of the last short step; it decreases after other steps.
     pub failed_damping: f64,
-    /// Whether the last direction was that of the violations alone.
+    /// Whether the last direction was a feasibility step.
     pub is_feasibility_step: bool,
-    /// Whether QPs are solved to as many digits as there are.
+    /// Whether QPs are solved to all digits.
     pub full_qp_accuracy: bool,
-    /// Whether the QP that the last direction comes from was overwritten.
+    /// Whether the QP of the last direction has been overwritten.
     pub qp_overwritten: bool,
-    /// Whether a QP with penalties was solved, and violations are left.
+    /// Whether an elastic QP has been solved, and violations remain.
     pub reenter_elastic_mode: bool,
-    /// Steps with penalties in a row.
+    /// Consecutive elastic steps.
     pub elastic_steps: usize,
-    /// The penalty that violations were found to need; zero at first.
+    /// The penalty determined by steering; zero at first.
     pub required_penalty: f64,
-    /// The iterations of QPs of an iteration after which those at work end.
+    /// The number of QP iterations of this iteration at which the present QPs stop.
     pub qp_iteration_budget: usize,
-    /// What this iteration tries.
+    /// The attempt at this iterate.
     pub attempt: Attempt,
-    /// Why the QP of the last iteration has no solution.
+    /// The error of the QP of the last attempt.
     pub qp_failure: Option<QpError>,
-    /// Whether a short step may be refused, because more damping can be tried.
+    /// Whether short steps may be rejected, since more damping is possible.
     pub may_reject_short_steps: bool,
     /// The largest violation of the guess.
     pub guess_violation: f64,
     /// The largest residual of the best iterate, of both attempts.
     pub best_residual: f64,
-    /// That iterate.
+    /// The log row of the best iterate.
     pub best_iteration: Iteration,
     /// The largest residual in units.
     pub residual_in_units: f64,
-    /// The largest residual in what the tolerance is multiplied by.
+    /// The largest residual, relative to the factors of the tolerance.
     pub nlp_error: f64,
-    /// Units, unless all of them are one.
+    /// The objective unit and the smallest unit, unless all units are one.
     pub scaling: Option<ProblemScaling>,
-    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    /// Whether the run converged with the objective unit of the guess, and continues with a smaller
+    /// one.
     pub has_rescaled_objective: bool,
-    /// Short steps of the merit function, but for those with penalties, less full ones.
+    /// Short steps with the merit function, without elastic ones, minus full steps.
     pub short_steps: usize,
-    /// Infeasible, where bounds contradict each other.
+    /// The status `Infeasible` of contradictory bounds.
     pub contradictory_bounds: Option<Status>,
     pub number_type: PhantomData<T>,
 }
 
-/// Steps that are no longer are followed by more damping: by that factor, or by what would leave
-/// of the step along a curvature the cube root of the part that was gone.
+/// Steps up to this length increase the damping: by the factor `DAMPING_INCREASE`, or to
+/// `κ (α^DAMPING_EXPONENT − 1)` for the step length `α` and the curvature `κ` along the step.
 const SHORT_STEP: f64 = 1.0 / 16.0;
 const DAMPING_INCREASE: f64 = 4.0;
-/// After so many short steps more than full ones the merit function gives way to the filter: where
-/// constraints bend more than its weights let pass, it creeps along them.
+/// The difference between the numbers of short and of full steps at which the filter replaces the
+/// merit function: with strongly curved constraints the merit function accepts only short steps.
 const SHORT_STEPS_BEFORE_FILTER: usize = 5;
 const DAMPING_EXPONENT: f64 = -1.0 / 3.0;
-/// Other steps are followed by less damping, but not by less than the geometric mean of what there
-/// was and of what was too little the last time; that is forgotten by a factor.
+/// After other steps the damping becomes `max(0.2 damping, √(damping · failed_damping))`, and the
+/// failed damping decreases by a factor.
 const DAMPING_DECREASE: f64 = 0.2;
 const FAILED_DAMPING_DECREASE: f64 = 0.1;
-/// The least and the most of it.
+/// The smallest and the largest damping.
 const MIN_DAMPING: f64 = 1e-8;
 const MAX_DAMPING: f64 = 1e2;
 
 impl<T> RunState<'_, T> {
-    /// That of a run that begins.
+    /// The state at the start of a run.
     pub fn new() -> Self {
         Self {
             deadline_passed: None,
@@ -132,24 +133,25 @@ impl<T> RunState<'_, T> {
         }
     }
 
-    /// Asks the clock, unless it was late already.
+    /// Whether the deadline has passed; does not ask again once it has.
     pub fn is_out_of_time(&mut self) -> bool {
         self.out_of_time = self.out_of_time || self.deadline_passed.as_mut().is_some_and(|over| over());
         self.out_of_time
     }
 
-    /// Whether Levenberg's and Marquardt's method damps steps: those of Gauss's and Newton's
-    /// cannot go all the way.
+    /// Whether short steps are replaced by Levenberg-Marquardt damping: with Gauss-Newton Hessians,
+    /// and after a restart.
     pub fn uses_levenberg_marquardt(&self, has_exact_hessian: bool) -> bool {
         self.second_attempt || !has_exact_hessian
     }
 
-    /// The unit of forces.
+    /// The unit of the objective.
     pub fn objective_unit(&self) -> f64 {
         self.scaling.map_or(1.0, |sizes| sizes.objective_unit)
     }
 
-    /// How far steps go: as options say, but by the filter where the merit function creeps.
+    /// The globalisation of the options; the filter after too many short steps with the merit
+    /// function.
     pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
         match options.globalisation {
             Globalisation::Merit if self.short_steps >= SHORT_STEPS_BEFORE_FILTER => Globalisation::Filter,
@@ -157,8 +159,8 @@ impl<T> RunState<'_, T> {
         }
     }
 
-    /// Counts short steps, less full ones without a correction. Whether it was the short one after
-    /// which the filter decides.
+    /// Counts short steps, minus full steps without correction. Returns whether the filter now
+    /// replaces the merit function.
     pub fn update_short_steps(&mut self, log_row: &Iteration, options: &SqpOptions) -> bool {
         if options.globalisation != Globalisation::Merit || self.short_steps >= SHORT_STEPS_BEFORE_FILTER {
             return false;
@@ -171,12 +173,12 @@ impl<T> RunState<'_, T> {
         self.short_steps == SHORT_STEPS_BEFORE_FILTER
     }
 
-    /// Whether a step was so short that damping helps.
+    /// Whether the step is so short that damping increases.
     pub fn is_short_step(&self, log_row: &Iteration) -> bool {
         log_row.step <= SHORT_STEP
     }
 
-    /// Damping of the next direction, after a step with such a curvature of the QP along it.
+    /// Updates the damping after a step with the given curvature of the QP along it.
     pub fn update_damping(&mut self, log_row: &Iteration, curvature: f64) {
         if self.is_short_step(log_row) {
             let by_curvature = curvature.max(0.0) * (Scalar::powf(log_row.step, DAMPING_EXPONENT) - 1.0);
@@ -193,7 +195,7 @@ impl<T> RunState<'_, T> {
     }
 }
 
-/// What a step was.
+/// An accepted step.
 pub(super) struct AcceptedStep {
     pub length: f64,
     pub corrected: bool,

@@ -1,11 +1,11 @@
-//! The QP in units: its variables, constraints and forces are near one for the solver, for what
-//! is added to its Hessian, and for penalties in place of its bounds.
+//! Scaling of the QP by units: variables, constraints and objective are near one for the QP solver,
+//! the regularisation and the penalties.
 //!
 //! ```text
 //! v = D v̂        c = R ĉ        f = φ f̂        D, R, φ: units
 //! ```
 //!
-//! These units are powers of two: whatever is scaled and scaled back is what it was, bit by bit.
+//! Units are powers of two: scaling and unscaling are exact.
 
 use super::Sqp;
 use super::run_state::RunState;
@@ -15,16 +15,17 @@ use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic_mode::{self, Worst};
 use crate::qp::interior::at;
 use crate::qp::{
-    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, padded_len, part, part_mut,
+    Arrays, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, StageOffsetsIter, padded_len, part,
+    part_mut,
 };
 use crate::scalar::Real;
 
-/// Units of single precision are no larger: squares of them are numbers.
+/// The largest unit in single precision; its square is finite.
 const MAX_SINGLE_PRECISION_UNIT: f64 = 8192.0;
-/// The bits of a number below its leading digit: without them it is a power of two.
+/// The mantissa bits of a number, without which it is a power of two.
 const MANTISSA_BITS: u64 = (1 << 52) - 1;
 
-/// How many numbers are units of rows.
+/// The length of the memory for the units of rows.
 pub(super) const fn unit_memory_len<T>(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (0_usize, dims);
     while let Some((first, others)) = rest.split_first() {
@@ -40,7 +41,7 @@ const fn saturating_padded_len<T>(n: usize) -> usize {
     if n > usize::MAX / 2 { usize::MAX } else { padded_len::<T>(n) }
 }
 
-/// The power of two that is not above a positive number.
+/// The largest power of two that is at most a positive number.
 fn floor_power_of_two<T: Real>(unit: f64) -> f64 {
     let unit = if T::EPSILON < 1e-10 {
         unit
@@ -50,21 +51,21 @@ fn floor_power_of_two<T: Real>(unit: f64) -> f64 {
     f64::from_bits(unit.to_bits() & !MANTISSA_BITS)
 }
 
-/// Where numbers go.
+/// The direction of scaling.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum ScalingDirection {
-    /// Into units.
+    /// From the units of the problem to scaled units.
     Scale,
-    /// Into those of the problem.
+    /// Back to the units of the problem.
     Unscale,
 }
 
-/// What numbers are divided by.
+/// Scaling factors of a QP.
 #[derive(Clone, Copy)]
 pub(super) struct QpScaling<'a, T> {
     units: ScalingUnits<'a, T>,
     direction: ScalingDirection,
-    /// Whether it is what tolerances are multiplied by, and not the units themselves.
+    /// Whether the factors are those of tolerances, not the units.
     for_tolerances: bool,
 }
 
@@ -78,12 +79,12 @@ impl<T: Real> QpScaling<'_, T> {
         self.factor(self.units.scaling.objective_unit)
     }
 
-    /// Those of some rows.
+    /// The factors of a range of rows.
     fn row_factors(&self, begin: usize, count: usize) -> impl Iterator<Item = T> + Clone {
         part(self.units.rows, begin, count).iter().map(|unit| self.factor(unit.to_f64()))
     }
 
-    /// The data of a QP.
+    /// Scales the data of a QP.
     fn scale_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(&self, qp: &mut Qp<T, D, M>) {
         let force = self.objective_factor();
         let mut row = 0;
@@ -100,7 +101,7 @@ impl<T: Real> QpScaling<'_, T> {
             }
             gradient.iter_mut().zip(row_units.clone()).for_each(|(g, unit)| *g = *g * unit / force);
             offset.iter_mut().zip(self.row_factors(row, next)).for_each(|(b, unit)| *b = *b / unit);
-            // Both bounds; for both of them the linear penalties, and the quadratic ones.
+            // Lower and upper bounds, and for both the linear and the quadratic penalties.
             for (values, kind) in limits.chunks_exact_mut(rows.max(1)).zip([0, 0, 1, 2, 1, 2]) {
                 for (value, unit) in values.iter_mut().zip(row_units.clone()) {
                     *value = match kind {
@@ -113,19 +114,19 @@ impl<T: Real> QpScaling<'_, T> {
         }
     }
 
-    /// A point with its multipliers.
+    /// Scales a point with its multipliers.
     fn scale_point(&self, SolutionView { dims, v, dynamics, lower, upper }: SolutionView<'_, T>) {
-        for place in Places::<T>::new(dims) {
+        for place in StageOffsetsIter::<T>::new(dims) {
             let units = self.row_factors(place.row, place.n);
             part_mut(v, place.v, place.n).iter_mut().zip(units).for_each(|(v, unit)| *v = *v / unit);
         }
         self.scale_multipliers(SolutionView { dims, v, dynamics, lower, upper });
     }
 
-    /// The multipliers alone.
+    /// Scales multipliers only.
     fn scale_multipliers(&self, SolutionView { dims, dynamics, lower, upper, .. }: SolutionView<'_, T>) {
         let force = self.objective_factor();
-        for place in Places::<T>::new(dims) {
+        for place in StageOffsetsIter::<T>::new(dims) {
             let behind = self.row_factors(place.row + place.rows, place.next);
             let dynamics = part_mut(dynamics, place.dynamics, place.next);
             dynamics.iter_mut().zip(behind).for_each(|(pi, unit)| *pi = *pi * unit / force);
@@ -139,7 +140,7 @@ impl<T: Real> QpScaling<'_, T> {
 }
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// Finds the units at the iterate, where the QP is written.
+    /// Computes the units at the iterate. The QP must be written there.
     pub(super) fn find_units<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -160,15 +161,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             least = least.min(rounded);
         }
         let are_all_one = force == 1.0 && rows.iter().all(|&unit| unit == T::ONE);
-        state.scaling =
-            (!are_all_one).then_some(ProblemScaling { objective_unit: force, min_row_unit: least });
+        state.scaling = (!are_all_one).then_some(ProblemScaling { objective_unit: force, tolerance: least });
         if !are_all_one {
-            // The last digits of residuals count in units.
+            // Tolerances of scaled residuals are up to this factor smaller.
             self.qp_solver.require(self.options.tolerance / NEAR_ONE_RATIO);
         }
     }
 
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
+    /// is far too large. Returns whether it has been replaced.
     pub(super) fn rescale_objective<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -181,7 +182,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let rows = self.workspace.as_ref().get(saved_penalties_end(ocp)..).unwrap_or_default();
         let scratch = self.trial_point.view_mut().v;
-        // QPs are solved to a hundredth.
+        // QPs are solved to a hundredth of the tolerance.
         let least = self.options.tolerance / NEAR_ONE_RATIO;
         let Some(smaller) = ocp.reduced_objective_unit(rows, sizes.objective_unit, least, scratch) else {
             return false;
@@ -191,7 +192,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         true
     }
 
-    /// The QP, the iterate and the solution, into units or back.
+    /// Scales or unscales the QP, the iterate and the solution.
     pub(super) fn scale_qp_and_points<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -205,7 +206,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         scale.scale_point(self.qp_solution.view_mut());
     }
 
-    /// The multipliers of the solution and the weights of violations, into units or back.
+    /// Scales or unscales the multipliers of the solution and the weights of violations.
     pub(super) fn scale_weights<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -218,7 +219,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         scale.scale_multipliers(self.violation_weights.view_mut());
     }
 
-    /// The largest residual in what tolerances are multiplied by.
+    /// Returns the largest residual, relative to the factors of tolerances.
     pub(super) fn nlp_error<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -242,10 +243,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         scaled_residuals.largest()
     }
 
-    /// A violation in units, in those of the problem.
+    /// Converts a violation from scaled units to units of the problem.
     pub(super) fn unscaled_violation<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, worst: Worst) -> Worst {
         let rows = self.workspace.as_ref().get(saved_penalties_end(ocp)..).unwrap_or_default();
-        let places = Places::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
+        let places = StageOffsetsIter::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
         let unit = places.map_or(1.0, |place| {
             let begin = match worst.field {
                 QpField::StateBounds => 0,
@@ -258,7 +259,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The units in the memory of a run, where they are not all one.
+/// The units in the workspace, unless all are one.
 fn scaling_units<'s, P, T, D, M>(
     work: &'s [T],
     ocp: &Ocp<P, T, D, M>,
@@ -274,7 +275,7 @@ where
     state.scaling.map(|sizes| ScalingUnits { scaling: sizes, rows })
 }
 
-/// The linear penalties that are remembered, in the memory of a run.
+/// The saved linear penalties in the workspace.
 pub(super) fn saved_penalties_mut<'s, P, T, D, M>(work: &'s mut [T], ocp: &Ocp<P, T, D, M>) -> &'s mut [T]
 where
     P: Program<T>,
@@ -285,7 +286,7 @@ where
     work.get_mut(ocp.ends()..saved_penalties_end(ocp)).unwrap_or_default()
 }
 
-/// Where penalties end in the memory of a run, and units begin.
+/// The end of the penalties in the workspace, where the units start.
 pub(super) fn saved_penalties_end<
     P: Program<T>,
     T: Real,

@@ -1,14 +1,14 @@
-//! The first state where it is free, the multipliers `θ` of periodic states, and shared controls
-//! `w`: unknowns of one small system beside the recursion.
+//! The bordered system: its unknowns are outside the recursion, namely a free first state, the
+//! multipliers `θ` of periodic states, and shared controls `w`.
 //!
 //! ```text
 //! π₀ + E θ = 0        x₀ − x_N = 0        Σ_k ∂L/∂u_k[j] = 0
 //! ```
 //!
-//! Each unknown is one column of this system: a pass through the recursion where it is one, and all
-//! others are zero. It is symmetric, and inertia adds up (E. V. Haynsworth, Linear Algebra Appl. 1,
-//! 1968): the solution is a minimum where pivots of controls and of the border together have as
-//! many negative signs as there are periodic states.
+//! Each column is a pass through the recursion with one unknown set to one and all others to zero.
+//! The system is symmetric, and inertia is additive (E. V. Haynsworth, Linear Algebra Appl. 1,
+//! 1968): the solution is a minimum if the pivots of controls and of the bordered system together
+//! have as many negative signs as there are periodic states.
 
 use super::kkt_direction::KktDirection;
 use crate::linalg::{axpy, dot};
@@ -18,24 +18,24 @@ use crate::qp::{QpView, marked_indices, part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// The unknowns `(x₀, θ, w)`, of which there may be none.
+/// The bordered system with the unknowns `(x₀, θ, w)`, each of which may be absent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BorderedSystem<T> {
     nx: usize,
     nu: usize,
-    /// How many elements of the first state there are: none where it is given.
+    /// The number of elements of a free first state; zero if it is given.
     free_initial_states: usize,
     pub(super) periodic_states: Vec<usize>,
     shared_controls: Vec<usize>,
-    /// Rows of `M` of shared controls, of every interval.
+    /// The rows of `M` of shared controls, for every interval.
     shared_control_rows: Vec<T>,
-    /// Factors of the system.
+    /// The factors of the system.
     pub(super) factors: Vec<T>,
     pub(super) pivot_exchanges: Vec<T>,
 }
 
 impl<T: Real> BorderedSystem<T> {
-    /// That of a problem, in memory of the last one where it is the same.
+    /// Prepares the system of a problem; keeps the memory if the unknowns are unchanged.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -62,19 +62,19 @@ impl<T: Real> BorderedSystem<T> {
         Ok(())
     }
 
-    /// How many unknowns there are.
+    /// The number of unknowns.
     pub fn unknown_count(&self) -> usize {
         self.free_initial_states + self.periodic_states.len() + self.shared_controls.len()
     }
     pub fn condition_count(&self) -> usize {
         self.periodic_states.len()
     }
-    /// Whether the first state is found.
+    /// Whether the first state is an unknown.
     pub fn has_free_initial_state(&self) -> bool {
         self.free_initial_states > 0
     }
 
-    /// Takes the rows of shared controls out of `M`, so that these are not eliminated.
+    /// Moves the rows of shared controls out of `M`, so that shared controls are not eliminated.
     pub fn extract_shared_control_rows(&mut self, k: usize, m: &mut [T]) {
         let (nx, size) = (self.nx, self.nx + self.nu);
         let rows = part_mut(
@@ -102,23 +102,23 @@ impl<T: Real> BorderedSystem<T> {
         )
         .chunks_exact(size.max(1))
     }
-    /// Shared controls and where they are among the unknowns.
+    /// Shared controls with their indices among the unknowns.
     fn shared_control_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
         let begin = self.free_initial_states + self.periodic_states.len();
         self.shared_controls.iter().enumerate().map(move |(c, &j)| (begin + c, j))
     }
-    /// Periodic states and where their multipliers are among the unknowns.
+    /// Periodic states with the indices of their multipliers among the unknowns.
     fn periodic_multiplier_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
         self.periodic_states.iter().enumerate().map(|(c, &i)| (self.free_initial_states + c, i))
     }
 
-    /// The first state.
+    /// The first state: given, or an unknown.
     pub fn initial_state<'a>(&self, start: &'a [T], unknowns: &'a [T]) -> &'a [T] {
         if self.has_free_initial_state() { unknowns } else { start }
     }
 
-    /// Adds what shared controls do to a gradient, whose elements by them belong to their own
-    /// conditions.
+    /// Adds the contribution of shared controls to a gradient, and moves the elements of shared
+    /// controls to the residuals of their conditions.
     pub fn add_shared_control_gradient(&self, k: usize, unknowns: &[T], q: &mut [T], residual: &mut [T]) {
         for ((unknown, _), row) in self.shared_control_unknowns().zip(self.shared_control_rows(k)) {
             axpy(get(unknowns, unknown), row, q);
@@ -129,12 +129,13 @@ impl<T: Real> BorderedSystem<T> {
         }
     }
 
-    /// Adds what `θ` does to the gradient by the last state.
+    /// Adds the contribution of `θ` to the gradient with respect to the last state.
     pub fn add_periodic_multipliers(&self, unknowns: &[T], q: &mut [T]) {
         self.periodic_multiplier_unknowns().for_each(|(unknown, i)| add(q, i, -get(unknowns, unknown)));
     }
 
-    /// Sets shared controls, after what the state and the other controls do to their conditions.
+    /// Sets the shared controls, and adds the contributions of the state and the other controls to
+    /// the residuals of their conditions.
     pub fn set_shared_controls(&self, k: usize, x: &[T], u: &mut [T], unknowns: &[T], residual: &mut [T]) {
         for ((condition, _), row) in self.shared_control_unknowns().zip(self.shared_control_rows(k)) {
             add(residual, condition, dot(part(row, 0, self.nx), x) + dot(part(row, self.nx, self.nu), u));
@@ -142,8 +143,8 @@ impl<T: Real> BorderedSystem<T> {
         self.shared_control_unknowns().for_each(|(unknown, j)| set(u, j, get(unknowns, unknown)));
     }
 
-    /// The conditions of the first state and of periodic ones, at the end of a pass. Multipliers of
-    /// the first state contain `θ` from here on.
+    /// Evaluates the conditions of the first state and of periodic states at the end of a pass. The
+    /// multipliers of the first state contain `θ` afterwards.
     pub fn evaluate_conditions(&self, n: usize, direction: &mut KktDirection<T>) {
         for (condition, i) in self.periodic_multiplier_unknowns() {
             let gap = get(direction.state(0), i) - get(direction.state(n), i);

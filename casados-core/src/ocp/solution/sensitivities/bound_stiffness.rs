@@ -1,33 +1,33 @@
-//! Bounds as springs: stiff ones where they are active, those of the barrier where solutions are
-//! smoothed.
+//! Bounds as additions to the Hessian: stiff springs for active bounds, the barrier's Hessian for
+//! smoothed solutions.
 
 use super::get;
 use crate::qp::Bounds;
 use crate::scalar::Real;
 
-/// What bounds add to the Hessian.
+/// The stiffness of bounds, which is added to the Hessian.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoundStiffness<T> {
-    /// Of active bounds: large beside the elements of the Hessians. What they give way by is its
-    /// inverse.
+    /// The stiffness of active bounds: large compared to the Hessians. Its inverse is their
+    /// compliance.
     active_stiffness: T,
-    /// The barrier parameter that the point solves; zero for active sets.
+    /// The barrier parameter of the iterate; zero for active sets.
     mu: T,
-    /// Slacks and multipliers below are small.
+    /// Slacks and multipliers below this are small.
     tolerance: T,
-    /// How many bounds have neither a slack nor a multiplier that is not small.
+    /// The number of bounds whose slack and multiplier are both small.
     pub weakly_active: usize,
 }
 
 impl<T: Real> BoundStiffness<T> {
-    /// For Hessians with this largest element.
+    /// The stiffness for Hessians with this largest element.
     pub fn new(largest: T, mu: T) -> Self {
         let root = T::from_f64(T::EPSILON).sqrt();
         let active = if largest > T::ZERO { largest / root } else { T::ONE / root };
         Self { active_stiffness: active, mu, tolerance: root.sqrt(), weakly_active: 0 }
     }
 
-    /// What both sides of a bound add.
+    /// The stiffness of a lower and an upper bound.
     pub fn stiffness_of_bound(
         &mut self,
         bounds: &Bounds<'_, T>,
@@ -44,7 +44,7 @@ impl<T: Real> BoundStiffness<T> {
             + self.stiffness_of_side(above, upper, at(bounds.upper_linear), at(bounds.upper_quadratic))
     }
 
-    /// What a side adds, from its slack, multiplier and penalties.
+    /// The stiffness of one bound, from its slack, multiplier and penalties.
     fn stiffness_of_side(&mut self, slack: T, multiplier: T, linear: T, quadratic: T) -> T {
         if !slack.is_finite() {
             T::ZERO
@@ -55,12 +55,12 @@ impl<T: Real> BoundStiffness<T> {
         }
     }
 
-    /// Much where a side is active, its quadratic penalty where it is violated softly.
+    /// Large for an active bound, the quadratic penalty for a violated soft bound.
     fn active_set_stiffness(&mut self, slack: T, multiplier: T, linear: T, quadratic: T) -> T {
         let missing_multiplier = linear - quadratic * slack - multiplier;
         let is_weak = |a: T, b: T| a.abs() < self.tolerance && b.abs() < self.tolerance;
         self.weakly_active += usize::from(is_weak(slack, multiplier) || is_weak(slack, missing_multiplier));
-        // Of a violation and the force that its multiplier lacks one is zero.
+        // Either the violation or the difference to the largest multiplier is zero.
         if slack < T::ZERO && linear.is_finite() && -slack > missing_multiplier {
             quadratic
         } else if multiplier > slack {
@@ -71,7 +71,7 @@ impl<T: Real> BoundStiffness<T> {
     }
 
     /// `−dλ/dd` of `s λ = μ` with `s = d + e`, where the violation `e` has a barrier, too:
-    /// `e (linear + quadratic e − λ) = μ`. It is none for hard sides.
+    /// `e (linear + quadratic e − λ) = μ`. Hard bounds have no `e`.
     fn smoothed_stiffness(&self, distance: T, multiplier: T, linear: T, quadratic: T) -> T {
         let (mut slack, mut inverse_penalty_stiffness) = (distance, T::ZERO);
         if linear.is_finite() {
@@ -82,7 +82,7 @@ impl<T: Real> BoundStiffness<T> {
             slack = slack + violation;
             inverse_penalty_stiffness = T::ONE / (quadratic + self.mu / (violation * violation));
         }
-        // The one of both that is not small has the digits.
+        // Slack or multiplier, whichever is larger, is accurate.
         let inverse_barrier_stiffness =
             if multiplier > slack { self.mu / (multiplier * multiplier) } else { slack * slack / self.mu };
         T::ONE / (inverse_barrier_stiffness + inverse_penalty_stiffness)

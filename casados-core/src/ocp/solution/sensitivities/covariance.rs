@@ -26,7 +26,7 @@ use core::fmt;
 /// The covariance of states and controls of an estimate; see
 /// [`Ocp::covariance`](crate::ocp::Ocp::covariance).
 ///
-/// Parameters that are estimated are [free](crate::ocp::HeapOcp), the same at all stages.
+/// Estimated parameters are [free](crate::ocp::HeapOcp), equal at all stages.
 ///
 /// ```
 /// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -51,22 +51,22 @@ use core::fmt;
 #[derive(Clone, Debug)]
 pub struct Covariance<T> {
     names: &'static Names,
-    /// Names of free parameters, in front of the controls.
+    /// Names of free parameters, which precede the controls.
     free: Vec<&'static str>,
-    /// `NX`, free parameters and `NU`, intervals.
+    /// `NX`; free parameters and `NU`; intervals.
     dims: [usize; 3],
-    /// Rows of states and controls, stage after stage: those of `Z (Zᵀ H Z)^(−½)`.
+    /// Rows of `Z (Zᵀ H Z)^(−½)` for states and controls, by stages.
     rows: Vec<T>,
     identifiable_count: usize,
-    /// Whether a variable moves along a direction that data say nothing of.
+    /// Whether a variable changes along an unidentifiable direction.
     is_unidentifiable: Vec<bool>,
     directions: Vec<Unidentifiable<T>>,
     /// `s²`
     variance_factor: T,
 }
 
-/// A combination of variables that data say nothing of: the estimate may be moved along it, and the
-/// cost stays.
+/// An unidentifiable direction: a combination of variables along which the estimate can change
+/// without changing the cost.
 ///
 /// ```
 /// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -94,13 +94,13 @@ pub struct Covariance<T> {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Unidentifiable<T> {
-    /// Name, stage and coefficient of those variables that the others follow from: elements of the
-    /// first state, controls. The largest coefficient is one.
+    /// Name, stage and coefficient of the independent variables in the direction: elements of the
+    /// first state, and controls. The largest coefficient is one.
     pub parts: Vec<(&'static str, usize, T)>,
 }
 
-/// Writes what the direction consists of: `+1.00 x[2] −0.80 x[4]`, with the stage where it is not
-/// the first one.
+/// Writes the parts of the direction: `+1.00 x[2] −0.80 x[4]`, with the stage unless it is the
+/// first.
 impl<T: Real> fmt::Display for Unidentifiable<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, (name, stage, value)) in self.parts.iter().enumerate() {
@@ -121,15 +121,15 @@ impl<T: Real> Covariance<T> {
         self.directions.is_empty()
     }
 
-    /// What data say nothing of, one direction for each degree of freedom; empty if everything is
+    /// The unidentifiable directions, one for each degree of freedom; empty if everything is
     /// identifiable.
     #[must_use]
     pub fn unidentifiable(&self) -> &[Unidentifiable<T>] {
         &self.directions
     }
 
-    /// The same for a noise of another variance: with residuals that are not divided by their
-    /// standard deviation `s² = ‖r‖² / (m − n)`, of `m` residuals and `n` unknowns.
+    /// The covariance for another variance of the noise: for residuals that are not divided by
+    /// their standard deviation `s² = ‖r‖² / (m − n)`, with `m` residuals and `n` unknowns.
     #[must_use]
     pub fn scaled(self, variance: T) -> Self {
         Self { variance_factor: self.variance_factor * variance, ..self }
@@ -182,36 +182,36 @@ impl<T: Real> Covariance<T> {
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// The covariance of an estimate, which the iterate is: of all states, controls and free
-    /// parameters at all stages.
+    /// The covariance of the estimate at the iterate, for all states, controls and free parameters
+    /// at all stages.
     ///
     /// ```text
     /// Cov(w) = Z (Zᵀ H Z)⁻¹ Zᵀ
     /// ```
     ///
-    /// `H` is the Hessian of the cost, the matrix of Gauss and Newton `Σ JᵀWJ` with
-    /// [`GaussNewton`](crate::ocp::GaussNewton): with weights `1/σ²` the information of samples
-    /// with independent Gaussian noise of the standard deviation `σ`
-    /// ([`Covariance::scaled`] is for other weights), and of an arrival cost. Columns of `Z` are a
-    /// basis of the directions that dynamics, couplings and active hard bounds leave; bounds are
-    /// active where their multiplier is larger than their slack. Soft bounds are none.
+    /// `H` is the Hessian of the cost: with [`GaussNewton`](crate::ocp::GaussNewton) the
+    /// Gauss-Newton matrix `Σ JᵀWJ`. With weights `1/σ²` it is the information of samples with
+    /// independent Gaussian noise of standard deviation `σ`, and of an arrival cost; for other
+    /// weights see [`Covariance::scaled`]. The columns of `Z` are a basis of the null space of
+    /// dynamics, couplings and active hard bounds. A bound is active if its multiplier is larger
+    /// than its slack. Soft bounds are ignored.
     ///
-    /// What data say nothing of is found by the eigenvalues of `D Zᵀ H Z D`, whose diagonal is
-    /// one: those below `n m ε` times the largest one, with `n` unknowns, `m` variables in all
-    /// stages and the accuracy `ε` of the numbers, are no more than what rounding makes of sums of
-    /// `m` products. Their eigenvectors are [`Covariance::unidentifiable`]; a variable that moves
-    /// along one of these by more than `(n m ε)^½` of what it moves by where each unknown moves by
-    /// its unit, the inverse root of its diagonal element of `Zᵀ H Z`, has no variance.
+    /// Unidentifiable directions are eigenvectors of `D Zᵀ H Z D`, scaled to a unit diagonal, with
+    /// eigenvalues below `n m ε` times the largest one: the rounding error of sums of `m` products.
+    /// There are `n` unknowns and `m` variables in all stages; `ε` is the unit roundoff. They are
+    /// listed by [`Covariance::unidentifiable`]. A variable has no variance if it moves along one
+    /// of them by more than `(n m ε)^½` of its movement when each unknown moves by its unit, the
+    /// inverse root of its diagonal element of `Zᵀ H Z`.
     ///
-    /// It takes `O(m n² + n³)` operations.
+    /// The complexity is `O(m n² + n³)`.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise); [`OcpError::Qp`] if the Hessian on
-    /// the null space has a negative eigenvalue: the iterate is no minimum;
-    /// [`OcpError::OutOfMemory`]
+    /// The errors of [`Ocp::linearise`](crate::ocp::Ocp::linearise); [`OcpError::Qp`] if the
+    /// Hessian on the null space has a negative eigenvalue, so that the iterate is no minimum;
+    /// [`OcpError::OutOfMemory`].
     ///
     /// # Example
-    /// Of two parameters only the product is seen.
+    /// Only the product of two parameters is identifiable.
     /// ```
     /// use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -246,7 +246,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let rounding = T::from_f64(T::EPSILON * (n * (intervals + 1) * (nx + nu)).max(1) as f64);
         let information = self.reduced_hessian(&unknowns)?;
         let units: Vec<T> = (0..n).map(|i| diagonal_scale(get(&information.data, i * n + i))).collect();
-        // Directions that active constraints leave, each unknown in its unit.
+        // The null space of active constraints, with unknowns in their units.
         let mut free_directions = Vec::new();
         for (value, vector) in self.active_constraint_gram(&unknowns, &units)?.eigenpairs()? {
             if value <= rounding {
@@ -289,13 +289,13 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 }
 
-/// What makes a diagonal element one; one itself where it is zero.
+/// The factor that scales a diagonal element to one; one for a zero element.
 fn diagonal_scale<T: Real>(diagonal: T) -> T {
     if diagonal > T::ZERO { T::ONE / diagonal.sqrt() } else { T::ONE }
 }
 
 impl<T: Real> Unknowns<T> {
-    /// From the unknowns to all variables.
+    /// Computes the covariance of all variables from that of the unknowns.
     fn covariance<P: Formulation<T>>(
         &self,
         basis: &[Vec<T>],
@@ -339,8 +339,7 @@ impl<T: Real> Unknowns<T> {
         })
     }
 
-    /// A direction by the names of its parts, but for those that are no more than the tolerance in
-    /// their units.
+    /// Names the parts of a direction that exceed the tolerance in their units.
     fn named_direction(&self, direction: &[T], units: &[T], tolerance: T) -> Unidentifiable<T> {
         let largest =
             direction.iter().fold(T::ZERO, |largest, &d| if d.abs() > largest.abs() { d } else { largest });

@@ -1,4 +1,4 @@
-//! Adjoints of solutions and derivatives of optimal values, by the factors of a solution.
+//! Adjoints of solutions, and derivatives of optimal values, from the factors of a solution.
 
 use super::bordered_system::BorderedSystem;
 use super::bound_stiffness::BoundStiffness;
@@ -16,7 +16,7 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 
 impl<T: Real> SolutionFactors<T> {
-    /// The Hessian of the optimal value.
+    /// Computes the Hessian of the optimal value.
     pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
         let ([nx, _, np], given) = (self.dims, self.given_initial_states());
         let mut direction = core::mem::take(&mut self.direction);
@@ -41,8 +41,8 @@ impl<T: Real> SolutionFactors<T> {
         }
     }
 
-    /// `λᵀ dw/dx₀` and `λᵀ dw/dp`, where states and controls of `seed` are `λ`; its multipliers are
-    /// not looked at.
+    /// Computes `λᵀ dw/dx₀` and `λᵀ dw/dp`, where `λ` are the states and controls of `seed`;
+    /// multipliers of the seed are ignored.
     ///
     /// # Errors
     /// [`OcpError::Length`] if the seed has other dimensions; [`OcpError::InvalidValue`] if it is
@@ -65,8 +65,8 @@ impl<T: Real> SolutionFactors<T> {
         })
     }
 
-    /// The product of a solution of the conditions of optimality with what a parameter changes of
-    /// these.
+    /// The product of a KKT direction with the derivative of the optimality conditions with respect
+    /// to a parameter.
     fn product_with_parameter(&self, p: usize, direction: &KktDirection<T>) -> T {
         let [nx, nu, _] = self.dims;
         let mut sum = T::ZERO;
@@ -106,7 +106,7 @@ impl<T: Real> SolutionFactors<T> {
         Ok(())
     }
 
-    /// The recursion, for the QP at the iterate.
+    /// Factorises the QP at the iterate by the recursion and the bordered system.
     ///
     /// # Errors
     /// [`OcpError::Qp`]
@@ -134,18 +134,18 @@ impl<T: Real> SolutionFactors<T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Factorises the conditions of optimality at the iterate, for derivatives of the solution and
-    /// of its value: the iterate must be a solution.
+    /// Factorises the optimality conditions at the iterate, which must be a solution, for
+    /// derivatives of the solution and of its value.
     ///
-    /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
-    /// the solution; with those of Gauss and Newton approximations, but for the gradient of the
-    /// value, which has no Hessian in it.
+    /// With [`Exact`](crate::ocp::Exact) Hessians without convexification the derivatives are
+    /// exact. With Gauss-Newton Hessians they are approximations, except for the gradient of the
+    /// value, which does not depend on the Hessian.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state;
-    /// [`OcpError::FreeParameters`]; [`OcpError::Length`] if the memory is of another problem;
-    /// [`OcpError::InvalidOption`] of the smoothing; [`OcpError::Qp`] if the reduced Hessian is not
-    /// positive definite.
+    /// The errors of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is undefined;
+    /// [`OcpError::FreeParameters`]; [`OcpError::Length`] if the memory is that of another problem;
+    /// [`OcpError::InvalidOption`] for the smoothing; [`OcpError::Qp`] if the reduced Hessian is
+    /// not positive definite.
     pub fn factorise<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -159,7 +159,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         factors.factorise_qp(self.qp.view(), &self.iterate, true)
     }
 
-    /// Checks memory and options, and what has to be found beside the recursion.
+    /// Checks memory and options, and prepares the bordered system.
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`],

@@ -1,4 +1,4 @@
-//! The conditions of optimality at a solution, factorised once for any number of derivatives.
+//! Factors of the optimality conditions at a solution, for any number of derivatives.
 
 use super::bordered_system::BorderedSystem;
 use super::kkt_direction::KktDirection;
@@ -12,8 +12,8 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// The conditions of optimality at a solution, factorised: adjoint derivatives of the solution, and
-/// derivatives of the optimal value, by the initial state and by parameters.
+/// Factors of the optimality conditions at a solution: adjoint derivatives of the solution, and
+/// derivatives of the optimal value, with respect to the initial state and to parameters.
 ///
 /// ```text
 /// adjoint(λ)              λᵀ dw/dx₀,  λᵀ dw/dp            w = (x₀, u₀, …, x_N) of the solution
@@ -22,24 +22,24 @@ use alloc::vec::Vec;
 /// ```
 ///
 /// `p` are the parameters of all stages, which change together.
-/// [`Ocp::factorise`](crate::ocp::Ocp::factorise) fills it by one linearisation and one Riccati
-/// recursion, `O(N (NX + NU)³)`. An adjoint costs `O(N (NX + NU) (NX + NU + NP))`, however many
-/// parameters there are; the Hessian of the value one such solve for each parameter. The gradient
-/// of the value is that of the Lagrangian (envelope theorem), and costs nothing more.
+/// [`Ocp::factorise`](crate::ocp::Ocp::factorise) computes the factors by one linearisation and one
+/// Riccati recursion, `O(N (NX + NU)³)`. An adjoint costs `O(N (NX + NU) (NX + NU + NP))`, for any
+/// number of parameters; the Hessian of the value costs one such solve for each parameter. The
+/// gradient of the value is that of the Lagrangian (envelope theorem), at no further cost.
 ///
-/// A free initial state, periodic states and shared controls are unknowns beside the recursion.
-/// There are no derivatives by a free initial state.
+/// A free initial state, periodic states and shared controls are unknowns of a bordered system.
+/// There are no derivatives with respect to a free initial state.
 ///
-/// Where bounds are active the derivatives are those along which the active set stays. At a bound
-/// that is active without a force solutions have two derivatives, one for each side. Then the bound
-/// counts as active if its multiplier is larger than its slack, and [`weakly_active`] says how many
-/// bounds are in question. [`smoothing`] gives derivatives that are continuous there.
+/// Derivatives are those for a constant active set. At a weakly active bound solutions have two
+/// one-sided derivatives; the bound counts as active if its multiplier is larger than its slack.
+/// [`weakly_active`] is the number of such bounds. [`smoothing`] makes derivatives continuous
+/// there.
 ///
 /// [`weakly_active`]: SolutionFactors::weakly_active
 /// [`smoothing`]: SolutionFactors::smoothing
 ///
 /// # Example
-/// The distance of a mass is a parameter: what does it change of the cost?
+/// Derivatives of the optimal cost with respect to the target of a mass, a parameter:
 /// ```
 /// use casados::ocp::{Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SolutionFactors};
 /// use casados::prelude::*;
@@ -69,22 +69,23 @@ use alloc::vec::Vec;
 /// ```
 #[derive(Clone, Debug)]
 pub struct SolutionFactors<T> {
-    /// The barrier parameter `μ` that the iterate solves, as that of [`Ipm`](crate::ocp::Ipm) with
-    /// [`IpmOptions::final_mu`](crate::ocp::IpmOptions::final_mu): bounds are springs `μ/s²`, and
-    /// derivatives those of the barrier problem, which are smooth. Zero, the default: solutions of
-    /// the problem itself, with active sets.
+    /// The barrier parameter `μ` of the iterate, which must be a solution of
+    /// [`Ipm`](crate::ocp::Ipm) with this
+    /// [`IpmOptions::final_mu`](crate::ocp::IpmOptions::final_mu): derivatives are those of the
+    /// barrier problem, which are continuous; bounds have the stiffness `μ/s²`. Zero, the default:
+    /// derivatives of solutions of the problem itself, with active sets.
     pub smoothing: T,
     /// `NX`, `NU`, `NP`
     pub(super) dims: [usize; 3],
     pub(super) intervals: usize,
-    /// `K`, and factors of `M_uu`, of every interval.
+    /// `K` and the factors of `M_uu` of every interval.
     pub(super) gains: Vec<T>,
     pub(super) control_factors: Vec<T>,
     /// `P` of every stage.
     pub(super) costs_to_go: Vec<T>,
     /// The rows of `[A B]` of every interval.
     pub(super) dynamics: Vec<T>,
-    /// How many pivots of controls are negative.
+    /// The number of negative pivots of controls.
     pub(super) negative_pivots: usize,
     pub(super) bordered_system: BorderedSystem<T>,
     pub(super) parameter_derivatives: KktParameterDerivatives<T>,
@@ -100,7 +101,7 @@ pub struct SolutionFactors<T> {
 }
 
 impl<T: Real> SolutionFactors<T> {
-    /// Memory for a problem.
+    /// Allocates memory for a problem.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -129,23 +130,21 @@ impl<T: Real> SolutionFactors<T> {
         })
     }
 
-    /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, column after column; empty where
-    /// there is none.
+    /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, by columns; empty for other stages.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.dims;
         stage_matrix(&self.gains, stage, nu * nx)
     }
 
-    /// How many bounds have neither a slack nor a multiplier above `ε^¼` (1e-4 in double
-    /// precision): there, solutions have a derivative to either side. Zero where solutions are
-    /// smoothed.
+    /// The number of bounds whose slack and multiplier are both below `ε^¼` (1e-4 in double
+    /// precision), where solutions have two one-sided derivatives. Zero with smoothing.
     #[must_use]
     pub fn weakly_active(&self) -> usize {
         self.weakly_active
     }
 
-    /// `∂V/∂x₀`, `NX`; empty where the initial state is free.
+    /// `∂V/∂x₀`, `NX`; empty if the initial state is free.
     #[must_use]
     pub fn value_gradient_x0(&self) -> &[T] {
         part(&self.gradient, 0, self.given_initial_states())
@@ -157,7 +156,7 @@ impl<T: Real> SolutionFactors<T> {
         &self.parameter_derivatives.value_gradient
     }
 
-    /// How many elements of the first state are given: all, or none.
+    /// The number of given elements of the first state: all, or none.
     pub(super) fn given_initial_states(&self) -> usize {
         if self.bordered_system.has_free_initial_state() { 0 } else { self.dims[0] }
     }
@@ -178,7 +177,7 @@ impl<T: Real> SolutionFactors<T> {
     }
 }
 
-/// How many numbers `P [A B]`, `M`, a gradient and a state take.
+/// The length of memory for `P [A B]`, `M`, a gradient and a state.
 const fn work_len(nx: usize, nu: usize) -> usize {
     let size = nx + nu;
     nx * size + size * size + size + nx

@@ -1,4 +1,4 @@
-//! Matrices over the unknowns of an estimate: the reduced Hessian, and gradients of active
+//! Matrices over the unknowns of an estimate: the reduced Hessian, and the Gram matrix of active
 //! constraints.
 
 use super::get;
@@ -13,7 +13,7 @@ use crate::qp::{Bounds, copy_common, marked_indices, part, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// A symmetric matrix of `n` unknowns, column after column, both triangles.
+/// A symmetric matrix of `n` unknowns, by columns, with both triangles.
 pub(super) struct GramMatrix<T> {
     n: usize,
     pub data: Vec<T>,
@@ -31,7 +31,7 @@ impl<T: Real> GramMatrix<T> {
             axpy(half * x, b, column);
         }
     }
-    /// `Bᵀ A B`, for columns of `B`.
+    /// `Bᵀ A B`, where `basis` has the columns of `B`.
     pub fn reduced(&self, basis: &[Vec<T>]) -> Result<Self, OcpError> {
         let mut result = Self::new(basis.len())?;
         let mut product = zeros(self.n)?;
@@ -46,7 +46,7 @@ impl<T: Real> GramMatrix<T> {
         }
         Ok(result)
     }
-    /// Eigenvalues, each with its eigenvector (Jacobi's method).
+    /// Eigenvalues with their eigenvectors, by Jacobi's method.
     pub fn eigenpairs(mut self) -> Result<Vec<(T, Vec<T>)>, OcpError> {
         let n = self.n;
         let mut vectors = zeros(n * n)?;
@@ -76,8 +76,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         Ok(gram)
     }
 
-    /// `Σ c cᵀ` of the gradients of active constraints by the unknowns in their units, each of
-    /// length one.
+    /// `Σ c cᵀ` over the normalised gradients `c` of active constraints with respect to the
+    /// unknowns in their units.
     pub(super) fn active_constraint_gram(
         &self,
         unknowns: &Unknowns<T>,
@@ -133,7 +133,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 }
 
-/// Whether a hard bound is an equation, or its multiplier larger than its slack.
+/// Whether a hard bound is active: an equation, or a bound whose multiplier is larger than its
+/// slack.
 fn is_active<T: Real>(bounds: &Bounds<'_, T>, i: usize, value: T, [lower, upper]: [T; 2]) -> bool {
     let at = |values: &[T]| get(values, i);
     let is_hard = |linear: &[T]| !at(linear).is_finite();

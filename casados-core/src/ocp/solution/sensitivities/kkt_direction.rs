@@ -1,4 +1,4 @@
-//! Solutions of the conditions of optimality by the factors of the recursion.
+//! Solutions of the KKT system, by the factors of the recursion.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
@@ -6,7 +6,7 @@ use crate::qp::{part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// A direction: changes of states and controls, and those of the multipliers of the dynamics.
+/// A KKT direction: changes of states, controls and multipliers of the dynamics.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KktDirection<T> {
     nx: usize,
@@ -14,10 +14,10 @@ pub(super) struct KktDirection<T> {
     pub(super) x: Vec<T>,
     pub(super) u: Vec<T>,
     pub(super) pi: Vec<T>,
-    /// The first state, where it is given.
+    /// The change of a given first state.
     pub(super) initial_state: Vec<T>,
     pub(super) work: Vec<T>,
-    /// The unknowns of the border, and what is left of its conditions.
+    /// The unknowns of the bordered system, and the residuals of its conditions.
     pub border_unknowns: Vec<T>,
     pub border_residual: Vec<T>,
 }
@@ -42,14 +42,15 @@ impl<T: Real> KktDirection<T> {
     pub fn control(&self, k: usize) -> &[T] {
         part(&self.u, k * self.nu, self.nu)
     }
-    /// With so many unknowns of the border, all zero.
+    /// Resets the unknowns of the bordered system to this number of zeros.
     pub fn reset(&mut self, border_count: usize) {
         for values in [&mut self.border_unknowns, &mut self.border_residual] {
             values.clear();
             values.resize(border_count, T::ZERO);
         }
     }
-    /// Of what makes `x_k`; at the start of what makes it the first state, given or periodic.
+    /// The multipliers of the equation that determines `x_k`; at the start, of the given or
+    /// periodic first state.
     pub fn multipliers(&self, k: usize) -> &[T] {
         part(&self.pi, k * self.nx, self.nx)
     }
@@ -58,12 +59,12 @@ impl<T: Real> KktDirection<T> {
     }
 }
 
-/// What the conditions of optimality are solved for: a gradient `q_k` over `(x, u)`, and constants
-/// `e_k` of the dynamics.
+/// The right-hand side of the KKT system: a gradient `q_k` over `(x, u)`, and constants `e_k` of
+/// the dynamics.
 pub(super) trait RightHandSide<T> {
     /// Writes `q_k`, which is zero before.
     fn gradient(&self, k: usize, q: &mut [T]);
-    /// `e_k`; empty if there is none.
+    /// `e_k`; empty if it is zero.
     fn dynamics_constant(&self, k: usize) -> &[T];
 }
 

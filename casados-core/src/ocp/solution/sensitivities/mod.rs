@@ -1,13 +1,13 @@
-//! How a solution, and its value, change with the initial state and with parameters.
+//! Derivatives of a solution and of its value with respect to the initial state and to parameters.
 //!
 //! | | |
 //! | --- | --- |
-//! | `factors` | the conditions of optimality, factorised: adjoints, derivatives of the value |
-//! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
-//! | `column`, `border` | solutions by its factors, and what couples stages |
-//! | `parameters`, `references` | what these change of the conditions |
-//! | `covariance` | the covariance of an estimate, and what data say nothing of |
-//! | `unknowns`, `gram` | its unknowns, and the reduced Hessian over these |
+//! | `factors`, `derivatives` | factors of the KKT system: adjoints, derivatives of the value |
+//! | `recursion`, `bound_stiffness` | the Riccati recursion, and the stiffness of bounds |
+//! | `solve`, `kkt_direction`, `bordered_system` | solves by the factors, coupling of stages |
+//! | `parameters`, `references` | derivatives of the optimality conditions with respect to these |
+//! | `covariance` | the covariance of an estimate, and unidentifiable directions |
+//! | `unknowns`, `gram` | the unknowns of an estimate, and its reduced Hessian |
 
 mod bordered_system;
 mod bound_stiffness;
@@ -39,12 +39,11 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback
-/// `u_k + K_k (x − x_k)`.
+/// Derivatives of a solution: `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp`, and the gains of the
+/// feedback `u_k + K_k (x − x_k)`.
 ///
-/// Derivatives with respect to `p` are those where the parameters of all stages change together.
-/// Where few functions of the solution are of interest, adjoints by [`SolutionFactors`] are
-/// cheaper.
+/// For derivatives with respect to `p` the parameters of all stages change together. For few
+/// functions of the solution, adjoints by [`SolutionFactors`] are cheaper.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -70,16 +69,16 @@ use alloc::vec::Vec;
 #[non_exhaustive]
 pub struct Sensitivities<T> {
     factors: SolutionFactors<T>,
-    /// `dx/dx₀`, `du/dx₀`: matrices column after column, one stage after the other.
+    /// `dx/dx₀` and `du/dx₀`: matrices by columns, for all stages.
     x: Vec<T>,
     u: Vec<T>,
-    /// `dx/dp`, and `du/dp`
+    /// `dx/dp` and `du/dp`.
     x_p: Vec<T>,
     u_p: Vec<T>,
 }
 
 impl<T: Real> Sensitivities<T> {
-    /// Memory for a problem.
+    /// Allocates memory for a problem.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -97,35 +96,35 @@ impl<T: Real> Sensitivities<T> {
         })
     }
 
-    /// The factors, for adjoints and the value of the same solution, and their smoothing.
+    /// The factors, for adjoints and the value of the same solution, and for smoothing.
     pub fn factors(&mut self) -> &mut SolutionFactors<T> {
         &mut self.factors
     }
 
-    /// `K_k`, `NU × NX`, column after column; empty where there is none.
+    /// `K_k`, `NU × NX`, by columns; empty for other stages.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
         self.factors.gain(stage)
     }
-    /// `dx_k/dx₀`, `NX × NX`, column after column; zero where the initial state is free.
+    /// `dx_k/dx₀`, `NX × NX`, by columns; zero if the initial state is free.
     #[must_use]
     pub fn dx(&self, stage: usize) -> &[T] {
         let [nx, _, _] = self.factors.dims;
         stage_matrix(&self.x, stage, nx * nx)
     }
-    /// `du_k/dx₀`, `NU × NX`, column after column; zero where the initial state is free.
+    /// `du_k/dx₀`, `NU × NX`, by columns; zero if the initial state is free.
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.factors.dims;
         stage_matrix(&self.u, stage, nu * nx)
     }
-    /// `dx_k/dp`, `NX × NP`, column after column.
+    /// `dx_k/dp`, `NX × NP`, by columns.
     #[must_use]
     pub fn dx_dp(&self, stage: usize) -> &[T] {
         let [nx, _, np] = self.factors.dims;
         stage_matrix(&self.x_p, stage, nx * np)
     }
-    /// `du_k/dp`, `NU × NP`, column after column.
+    /// `du_k/dp`, `NU × NP`, by columns.
     #[must_use]
     pub fn du_dp(&self, stage: usize) -> &[T] {
         let [_, nu, np] = self.factors.dims;
@@ -148,8 +147,8 @@ impl<T: Real> Sensitivities<T> {
         factors.direction = direction;
     }
 
-    /// A derivative that is not finite: the stage, which of `(x, u)` is differentiated by which of
-    /// `(x₀, p)`, and its value.
+    /// A derivative that is not finite: its stage, its row in `(x, u)`, its column in `(x₀, p)`,
+    /// and its value.
     fn find_non_finite(&self) -> Option<(usize, usize, usize, f64)> {
         let [nx, nu, np] = self.factors.dims;
         let by_initial_state = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
@@ -178,7 +177,7 @@ impl<T: Real> Sensitivities<T> {
     }
 }
 
-/// The matrix of a stage; empty where there is none.
+/// The matrix of a stage; empty for other stages.
 fn stage_matrix<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
     let begin = stage.checked_mul(length);
     let end = begin.and_then(|begin| begin.checked_add(length));
@@ -186,16 +185,17 @@ fn stage_matrix<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// How the solution changes with its initial state and with parameters, where the bounds that
-    /// are active stay so: [`Ocp::factorise`], and one solution for each of both.
+    /// Computes the derivatives of the solution with respect to the initial state and to
+    /// parameters, for a constant active set: [`Ocp::factorise`], and one solve for each state and
+    /// parameter.
     ///
-    /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
-    /// the solution; with those of Gauss and Newton, which leave second derivatives of dynamics,
-    /// constraints and least squares out of what parameters change, too, they are approximations of
-    /// the same quality.
+    /// With [`Exact`](crate::ocp::Exact) Hessians without convexification the derivatives are
+    /// exact. Gauss-Newton Hessians omit second derivatives of dynamics, constraints and least
+    /// squares, also with respect to parameters; the derivatives are approximations of the same
+    /// quality.
     ///
     /// # Errors
-    /// Those of [`Ocp::factorise`]; [`OcpError::NonFiniteSensitivity`]
+    /// The errors of [`Ocp::factorise`]; [`OcpError::NonFiniteSensitivity`].
     pub fn differentiate<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -217,14 +217,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of
-    /// [`RealTime`](crate::ocp::RealTime) those of the feedback that was given, to be used until
-    /// the next one. Nothing is linearised for it, and nothing else than gains is in the result.
+    /// Computes the gains `K_k` of the last QP at its solution, the iterate. After a feedback of
+    /// [`RealTime`](crate::ocp::RealTime) they are those of this feedback, for use until the next
+    /// one. The problem is not linearised, and all other results are zero.
     ///
     /// # Errors
     /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory
-    /// is of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian is not
-    /// positive definite.
+    /// is that of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian
+    /// is not positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
         self.check_uncoupled()?;
         if self.initial_state == InitialState::Free {

@@ -1,4 +1,4 @@
-//! What parameters change of the conditions of optimality.
+//! Derivatives of the optimality conditions with respect to parameters.
 
 use crate::linalg::{axpy, dot};
 use crate::ocp::assembly::algebraic::{self, ExtendedDerivatives};
@@ -17,25 +17,25 @@ use crate::shape::Shape;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// Derivatives with respect to `p`, one stage after the other.
+/// Derivatives with respect to `p`, by stages.
 #[derive(Clone, Debug)]
 pub(super) struct KktParameterDerivatives<T> {
     /// `NX`, `NU`, `NP`
     dims: [usize; 3],
-    /// Rows of the constraints of a stage but the last.
+    /// The number of constraint rows of a stage except the last.
     rows: usize,
-    /// `∂φ/∂p`, column after column.
+    /// `∂φ/∂p`, by columns.
     end_jacobians: Vec<T>,
-    /// `∂²L/∂(x, u)∂p`, column after column.
+    /// `∂²L/∂(x, u)∂p`, by columns.
     gradient_jacobians: Vec<T>,
-    /// `∂g/∂p`, row after row.
+    /// `∂g/∂p`, by rows.
     constraint_jacobians: Vec<T>,
-    /// `∂L/∂p`, which is that of the optimal value, and `∂²L/∂p²`: sums over all stages.
+    /// `∂L/∂p`, the gradient of the optimal value, and `∂²L/∂p²`: sums over all stages.
     pub(super) value_gradient: Vec<T>,
     pub(super) value_hessian: Vec<T>,
-    /// `∂z/∂p`, column after column.
+    /// `∂z/∂p`, by columns.
     algebraic_jacobians: Vec<T>,
-    /// `∂²L/∂(x, u, z)∂p` of a stage, where `z` stays.
+    /// `∂²L/∂(x, u, z)∂p` of a stage for constant `z`.
     extended_gradient_jacobian: Vec<T>,
     /// `μ` of the constraints of a stage, and their values.
     mu: Vec<T>,
@@ -70,7 +70,7 @@ impl<T: Real> KktParameterDerivatives<T> {
         let [nx, nu, np] = self.dims;
         part(&self.gradient_jacobians, k * (nx + nu) * np, (nx + nu) * np)
     }
-    /// Adds what a constraint with the gradient `c` over `(x, u)` does as a spring.
+    /// Adds the stiffness of a constraint with the gradient `c` over `(x, u)`.
     pub(super) fn add_constraint(&mut self, [k, row]: [usize; 2], stiffness: T, c: &[T]) {
         let [nx, nu, np] = self.dims;
         let size = nx + nu;
@@ -81,14 +81,14 @@ impl<T: Real> KktParameterDerivatives<T> {
         }
     }
 
-    /// Before the first interval.
+    /// Resets all sums before the first interval.
     pub(super) fn reset(&mut self) {
         self.value_gradient.fill(T::ZERO);
         self.value_hessian.fill(T::ZERO);
         self.constraint_jacobians.fill(T::ZERO);
     }
 
-    /// `πᵀ ∂φ/∂p + μᵀ ∂g/∂p` of all stages.
+    /// Adds `πᵀ ∂φ/∂p + μᵀ ∂g/∂p` of all stages to the gradient of the value.
     fn add_value_gradient<'a>(&mut self, stages: impl Iterator<Item = SolutionStage<'a, T>>)
     where
         T: 'a,
@@ -106,7 +106,7 @@ impl<T: Real> KktParameterDerivatives<T> {
         }
     }
 
-    /// What an interval adds.
+    /// Adds an interval.
     pub(super) fn add_interval(&mut self, k: usize, step: &IntervalResult<'_, T>) {
         let [nx, nu, np] = self.dims;
         let (size, nz) = (nx + nu, step.z.len());
@@ -130,7 +130,7 @@ impl<T: Real> KktParameterDerivatives<T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Adds costs and constraints to what the intervals have added.
+    /// Adds costs and constraints, after the intervals.
     pub(super) fn differentiate_functions(
         &mut self,
         exact: bool,

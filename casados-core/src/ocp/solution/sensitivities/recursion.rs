@@ -1,4 +1,4 @@
-//! The Riccati recursion of derivatives.
+//! The Riccati recursion for derivatives of solutions.
 
 use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
@@ -11,8 +11,8 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 
-/// `∂V/∂x₀`: the derivative of the Lagrangian by the first state, without the multipliers that it
-/// has because it is given. Periodic states are those of the last stage, too.
+/// Computes `∂V/∂x₀`: the derivative of the Lagrangian with respect to the first state, without the
+/// multipliers of its bounds. Periodic states are states of the last stage, too.
 pub(super) fn value_gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
@@ -33,7 +33,7 @@ pub(super) fn value_gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsM
     }
 }
 
-/// The derivative by a variable of a stage of its cost, and of its constraints and the next state
+/// The derivative with respect to a variable of the stage cost, plus its constraints and next state
 /// times their multipliers.
 fn lagrangian_derivative<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> T {
     let view = stage.arrays();
@@ -47,8 +47,8 @@ fn lagrangian_derivative<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_
         .fold(cost_derivative, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
 }
 
-/// `P_k`, `K_k` and the factors of `M_uu`, backwards. With `parameters`, what these change is
-/// completed by active constraints.
+/// Computes `P_k`, `K_k` and the factors of `M_uu` backward. If `with_parameters`, adds active
+/// constraints to the derivatives with respect to parameters.
 ///
 /// # Errors
 /// [`QpError::NotConvex`]
@@ -108,7 +108,7 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     result
 }
 
-/// `M = H` and the springs of the bounds, its lower triangle, column after column.
+/// Writes `M = H` plus the stiffness of bounds: the lower triangle, by columns.
 fn write_stage_hessian<T: Real>(
     factors: &mut SolutionFactors<T>,
     m: &mut [T],
@@ -124,7 +124,7 @@ fn write_stage_hessian<T: Real>(
             set(m, j * size + i, get(view.hessian, j * ld + i));
         }
     }
-    // The state that is given does not move in this way.
+    // A given state is fixed by its equation.
     let states = if k == 0 && !factors.bordered_system.has_free_initial_state() { &[] } else { point.x };
     for (i, &x) in states.iter().enumerate() {
         let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
@@ -154,7 +154,7 @@ fn write_stage_hessian<T: Real>(
     }
 }
 
-/// Adds `[A B]ᵀ P [A B]`: `P` is symmetric, and rows of `[A B]` lie side by side.
+/// Adds `[A B]ᵀ P [A B]`: `P` is symmetric, and `[A B]` is stored by rows.
 fn add_cost_to_go<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[T], [nx, size]: [usize; 2]) {
     product.fill(T::ZERO);
     for (i, row) in product.chunks_exact_mut(size.max(1)).enumerate() {
@@ -171,8 +171,8 @@ fn add_cost_to_go<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[
     }
 }
 
-/// Factors `L D Lᵀ` of `M_uu` and how many pivots are negative; the pivot that vanishes or is
-/// negative beyond those that are allowed, if there is one.
+/// Computes the factors `L D Lᵀ` of `M_uu`, and returns the number of negative pivots. The error is
+/// a pivot that vanishes, or the first negative one beyond `max_negative`.
 fn factorise_controls<T: Real>(
     m: &[T],
     size: usize,

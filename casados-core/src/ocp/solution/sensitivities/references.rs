@@ -1,4 +1,4 @@
-//! What references change of solutions and of the optimal value.
+//! Derivatives of solutions and of the optimal value with respect to references.
 
 use super::factors::SolutionFactors;
 use crate::ocp::assembly::algebraic;
@@ -13,13 +13,12 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// How many references a problem with so many intervals has: those of the stages, one after the
-/// other, then that of the end.
+/// The number of references of a problem: those of the stages, then that of the terminal cost.
 pub(in crate::ocp) fn reference_count<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
     intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES
 }
 
-/// What is asked.
+/// The differentiated quantity.
 #[derive(Clone, Copy)]
 enum DifferentiatedQuantity<'a, T> {
     Value,
@@ -27,13 +26,12 @@ enum DifferentiatedQuantity<'a, T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// `λᵀ dw/dr` of the last [`SolutionFactors::adjoint`], by the references `r` of all stages,
-    /// one after the other, and then of the terminal cost: those of
-    /// [`LeastSquaresCost`](crate::ocp::LeastSquaresCost) and
+    /// Computes `λᵀ dw/dr` of the last [`SolutionFactors::adjoint`], for the references `r` of all
+    /// stages, then of the terminal cost, of [`LeastSquaresCost`](crate::ocp::LeastSquaresCost) and
     /// [`ConvexCost`](crate::ocp::ConvexCost).
     ///
     /// # Errors
-    /// [`OcpError::Length`] if there is no room for just as many; [`OcpError::NonFiniteFunction`]
+    /// [`OcpError::Length`] if `to` has another length; [`OcpError::NonFiniteFunction`]
     ///
     /// # Example
     /// ```
@@ -68,11 +66,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.differentiate_by_references(DifferentiatedQuantity::Adjoint(factors), to)
     }
 
-    /// `∂V/∂r` of the optimal value at the iterate, which must be a solution; as
-    /// [`Ocp::adjoint_by_references`].
+    /// Computes `∂V/∂r` of the optimal value at the iterate, which must be a solution, in the order
+    /// of [`Ocp::adjoint_by_references`].
     ///
     /// # Errors
-    /// As [`Ocp::adjoint_by_references`].
+    /// The errors of [`Ocp::adjoint_by_references`].
     pub fn value_gradient_by_references(&mut self, to: &mut [T]) -> Result<(), OcpError> {
         self.differentiate_by_references(DifferentiatedQuantity::Value, to)
     }

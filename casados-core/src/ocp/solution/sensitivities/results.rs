@@ -1,4 +1,4 @@
-//! What factors at a solution are asked for.
+//! Results of [`SolutionFactors`](super::SolutionFactors).
 
 /// `λᵀ dw/dx₀` and `λᵀ dw/dp`; see [`SolutionFactors`](super::SolutionFactors) for an example.
 ///
@@ -30,14 +30,14 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SolutionAdjoint<'a, T> {
-    /// By the initial state, `NX`; empty where it is free.
+    /// With respect to the initial state, `NX`; empty if it is free.
     pub x0: &'a [T],
-    /// By the parameters, `NP`.
+    /// With respect to the parameters, `NP`.
     pub p: &'a [T],
 }
 
-/// The Hessian of the optimal value; matrices column after column. Where the initial state is free
-/// there is nothing but `∂²V/∂p²`.
+/// The Hessian of the optimal value; matrices by columns. With a free initial state only `∂²V/∂p²`
+/// is not empty.
 ///
 /// ```
 /// # use casados::ocp::*;

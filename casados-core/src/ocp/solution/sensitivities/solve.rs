@@ -1,4 +1,4 @@
-//! Solutions of the conditions of optimality by the factors of the recursion.
+//! Solves of the KKT system by the factors of the recursion and the bordered system.
 
 use super::bordered_system::BorderedSystem;
 use super::factors::SolutionFactors;
@@ -10,7 +10,8 @@ use crate::qp::{QpError, Solution, StageDims, Symmetric, copy_common, part, part
 use crate::scalar::Real;
 
 impl<T: Real> BorderedSystem<T> {
-    /// Solves for a right-hand side: a pass with all unknowns zero says what these have to be.
+    /// Solves for a right-hand side: a sweep with all unknowns zero gives the residuals of the
+    /// bordered system, whose solution is used in a second sweep.
     pub fn solve<R: RightHandSide<T>>(
         &self,
         factors: &SolutionFactors<T>,
@@ -28,10 +29,10 @@ impl<T: Real> BorderedSystem<T> {
         }
     }
 
-    /// Factorises the system, column after column.
+    /// Factorises the system, column by column.
     ///
     /// # Errors
-    /// [`QpError::NotConvex`] where the point is no minimum.
+    /// [`QpError::NotConvex`] if the point is no minimum.
     pub fn factorise(
         factors: &mut SolutionFactors<T>,
         direction: &mut KktDirection<T>,
@@ -60,7 +61,7 @@ impl<T: Real> BorderedSystem<T> {
     }
 }
 
-/// Nothing.
+/// The zero right-hand side.
 pub(super) struct ZeroRightHandSide;
 
 impl<T> RightHandSide<T> for ZeroRightHandSide {
@@ -70,7 +71,7 @@ impl<T> RightHandSide<T> for ZeroRightHandSide {
     }
 }
 
-/// What a parameter changes.
+/// The right-hand side of a parameter.
 struct ParameterRightHandSide<'a, T>(&'a SolutionFactors<T>, usize);
 
 impl<T: Real> RightHandSide<T> for ParameterRightHandSide<'_, T> {
@@ -84,7 +85,7 @@ impl<T: Real> RightHandSide<T> for ParameterRightHandSide<'_, T> {
     }
 }
 
-/// A gradient over states and controls.
+/// A right-hand side with a gradient over states and controls.
 struct SeedRightHandSide<'a, T, D, M>(&'a Solution<T, D, M>);
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> RightHandSide<T>
@@ -99,7 +100,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> RightHandSide<T
     }
 }
 
-/// What an element of the first state changes, where it is given.
+/// Solves for the derivative with respect to an element of a given first state.
 pub(super) fn solve_initial_state<T: Real>(
     factors: &SolutionFactors<T>,
     element: usize,
@@ -110,7 +111,7 @@ pub(super) fn solve_initial_state<T: Real>(
     set(&mut direction.initial_state, element, T::ZERO);
 }
 
-/// What a parameter changes.
+/// Solves for the derivative with respect to a parameter.
 pub(super) fn solve_parameter<T: Real>(
     factors: &SolutionFactors<T>,
     p: usize,
@@ -119,7 +120,7 @@ pub(super) fn solve_parameter<T: Real>(
     factors.bordered_system.solve(factors, &ParameterRightHandSide(factors, p), direction);
 }
 
-/// What a gradient over states and controls changes.
+/// Solves for a gradient over states and controls.
 pub(super) fn solve_seed<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     factors: &SolutionFactors<T>,
     seed: &Solution<T, D, M>,
@@ -128,11 +129,11 @@ pub(super) fn solve_seed<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[
     factors.bordered_system.solve(factors, &SeedRightHandSide(seed), direction);
 }
 
-/// The solution where the first state, the multipliers `θ` of periodic states and the shared
-/// controls `w` are given, and what is left of the conditions of the border.
+/// Solves for given first state, multipliers `θ` of periodic states and shared controls `w`, and
+/// computes the residuals of the conditions of the bordered system.
 ///
-/// With `t = s_{k+1} + P_{k+1} e_k` backwards `q += [A B]ᵀ t + M_{·w} w`, `κ = −M_uu⁻¹ q_u`,
-/// `s_k = q_x + Kᵀ q_u`; then forwards `u = K x + κ`, `x₊ = A x + B u + e`, `π = P x + s`.
+/// With `t = s_{k+1} + P_{k+1} e_k`, backward `q += [A B]ᵀ t + M_{·w} w`, `κ = −M_uu⁻¹ q_u`,
+/// `s_k = q_x + Kᵀ q_u`; then forward `u = K x + κ`, `x₊ = A x + B u + e`, `π = P x + s`.
 pub(super) fn sweep<T: Real, R: RightHandSide<T>>(
     factors: &SolutionFactors<T>,
     right_hand_side: &R,

@@ -1,5 +1,4 @@
-//! What an estimate is found by, and how all variables follow from it: columns of a basis of the
-//! null space of dynamics.
+//! The unknowns of an estimate, and a basis of the null space of the dynamics.
 
 use crate::linalg::axpy;
 use crate::ocp::formulation::error::OcpError;
@@ -13,12 +12,12 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// What the estimate is found by: elements of the first state, free parameters and shared controls,
-/// controls of every stage; and how all variables follow from these.
+/// The unknowns of an estimate: elements of the first state, free parameters and shared controls,
+/// and controls of every stage; with the derivatives of all variables with respect to them.
 pub(super) struct Unknowns<T> {
-    /// `NX`, free parameters and `NU`, intervals.
+    /// `NX`; free parameters and `NU`; intervals.
     pub dims: [usize; 3],
-    /// Name and stage of each.
+    /// Name and stage of each unknown.
     pub names: Vec<(&'static str, usize)>,
     /// Rows of `Z`, a row of `names.len()` elements for each variable of each stage.
     pub rows: Vec<T>,
@@ -36,7 +35,7 @@ impl<T: Real> Unknowns<T> {
         part(&self.rows, self.row_start(stage, index), self.count())
     }
 
-    /// Those of a problem that has been linearised.
+    /// The unknowns of a linearised problem.
     pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
         let Layout { intervals, free_count: free, .. } = ocp.layout();
         let (nx, nu) = (P::Shape::NX, free + P::Shape::NU);
@@ -63,7 +62,7 @@ impl<T: Real> Unknowns<T> {
             let place = unknowns.row_start(0, i) + i;
             add(&mut unknowns.rows, place, T::ONE);
         }
-        // Free parameters are there at the last stage too.
+        // Free parameters belong to the last stage too.
         for w in 0..free {
             let place = unknowns.row_start(intervals, nx + w) + first + w;
             add(&mut unknowns.rows, place, T::ONE);

@@ -1,10 +1,10 @@
-//! A trajectory as a table for other programs.
+//! Export of trajectories as comma-separated values.
 
 use super::{Series, Trajectory};
 use crate::scalar::Real;
 use core::fmt;
 
-/// A trajectory as comma-separated values, to be printed or written:
+/// A trajectory as comma-separated values, for printing or writing:
 /// `std::fs::write("solution.csv", solution.csv().to_string())`.
 ///
 /// ```
@@ -26,10 +26,10 @@ use core::fmt;
 pub struct Csv<'a, T = f64>(&'a Trajectory<T>);
 
 impl<T: Real> Trajectory<T> {
-    /// Comma-separated values: a line with `t` and all names, then one for each time. Where
-    /// something has no value, as controls at the end, the place is empty.
+    /// Returns comma-separated values: a line with `t` and all names, then one line for each time.
+    /// A missing value, such as that of a control at the end, is an empty field.
     ///
-    /// Numbers are written with as many digits as it takes to read the same ones.
+    /// Numbers have as many digits as required to read the same values again.
     #[must_use]
     pub fn csv(&self) -> Csv<'_, T> {
         Csv(self)

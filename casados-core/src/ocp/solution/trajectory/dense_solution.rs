@@ -14,27 +14,27 @@ use crate::shape::Shape;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// How many points are inside of each interval, and what is found there.
+/// Values at points inside the intervals.
 struct InnerValues<T> {
     points: usize,
-    /// States, algebraic states and path constraints of one point after the other.
+    /// States, algebraic states and path constraints, by points.
     values: Vec<T>,
-    /// How many these are.
+    /// The number of values of a point.
     values_per_point: usize,
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// As [`Ocp::solution`], with this number of points inside of each interval, at equal
-    /// distances: by the dense output of implicit integrators, by shorter intervals of explicit
-    /// ones. Path constraints, which hold at nodes, are evaluated there too; bounds are those of
-    /// the node before, and there are no multipliers. Of a [`Map`](crate::ocp::Map) there are no
+    /// Returns [`Ocp::solution`] with the given number of equidistant points inside each interval:
+    /// by the dense output of implicit integrators, by shorter intervals for explicit integrators.
+    /// Path constraints, which are imposed at nodes, are also evaluated at these points. Bounds are
+    /// those of the node before, and there are no multipliers. A [`Map`](crate::ocp::Map) has no
     /// points between nodes.
     ///
     /// # Errors
-    /// As [`Ocp::linearise`].
+    /// The errors of [`Ocp::linearise`].
     ///
     /// # Example
-    /// A fall from rest: half of the way in time is a quarter of the way.
+    /// A fall from rest covers a quarter of the distance in half of the time:
     /// ```
     /// use casados::ocp::{Horizon, Problem};
     /// use casados::prelude::*;
@@ -65,8 +65,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             start + get(&parts, j) * (end - start)
         });
         dense.truncate(dense.len() - points);
-        // Those of which there is more inside come in the order in which that was found, but for
-        // states that are called otherwise.
+        // Series with values inside are in the order of these values, except states that are shown
+        // as controls or integrals.
         let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
         let (model_states, added_states) = model_names.x.split_at(model_names.model_state_count());
         let mut next = 0..;
@@ -86,7 +86,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Trajectory { model, times: dense, time_unit, series })
     }
 
-    /// What is inside of the intervals, in these places; nothing of maps.
+    /// Evaluates values inside the intervals, at these fractions; `None` for maps.
     fn evaluate_inside(
         &mut self,
         parts: &[T],
@@ -104,7 +104,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.variables_and_costates();
         let nodes = interval_nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
-        // Piece by piece, where intervals are integrated so.
+        // Intervals that are integrated in pieces are evaluated piece by piece.
         let ends = if has_points { self.inner_points.fractions() } else { &[T::ZERO, T::ONE] };
         let (mut start_variables, mut is_there) = (v.to_vec(), true);
         for (piece, ends) in ends.windows(2).enumerate() {
@@ -146,7 +146,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 impl<T: Real> InnerValues<T> {
-    /// Values at nodes, and those of points of the interval behind each.
+    /// Values at nodes, each followed by the values of points in the next interval.
     fn interleave<V: Copy>(&self, at_nodes: &[V], mut inside: impl FnMut(usize, usize) -> V) -> Vec<V> {
         let mut values = Vec::new();
         for (k, &value) in at_nodes.iter().enumerate() {
@@ -156,7 +156,7 @@ impl<T: Real> InnerValues<T> {
         values
     }
 
-    /// A series with points inside, where that is what has this index there.
+    /// A series with points inside, if it has an index among their values.
     fn dense_series(&self, series: &Series<T>, index: Option<usize>) -> Series<T> {
         let Series { kind, name, unit, first, values, lower, upper, .. } = series;
         let dense =
@@ -175,7 +175,7 @@ impl<T: Real> InnerValues<T> {
             upper: self.interleave(upper, |k, _| value_at(upper, k)),
             ..dense
         };
-        // Behind the last node there is nothing.
+        // There are no points after the last node.
         let is_at_nodes = matches!(kind, Kind::State | Kind::Parameter | Kind::Integral);
         if is_at_nodes || *kind == Kind::Control && index.is_some() {
             dense.values.truncate(dense.values.len().saturating_sub(self.points));

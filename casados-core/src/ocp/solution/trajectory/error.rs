@@ -1,4 +1,4 @@
-//! Why a name means nothing, or a trajectory is none of a problem.
+//! Errors of trajectories.
 
 use crate::ocp::formulation::error::OcpError;
 use alloc::boxed::Box;
@@ -6,7 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Why a name means nothing, or a trajectory is none of a problem.
+/// An unknown or ambiguous name, or a trajectory that does not fit a problem.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -28,45 +28,45 @@ use core::fmt;
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum TrajectoryError {
-    /// Nothing is called so.
+    /// The name is unknown.
     Unknown {
         /// The model.
         model: String,
         /// The name.
         name: String,
-        /// What there is.
+        /// The known names.
         known: Vec<String>,
     },
-    /// Several are called so.
+    /// The name matches several quantities.
     Ambiguous {
         /// The name.
         name: String,
-        /// Which ones.
+        /// The matching names.
         found: Vec<String>,
     },
-    /// The trajectory has not as many values, bounds or multipliers as the problem.
+    /// The number of values, bounds or multipliers differs from that of the problem.
     Length {
-        /// Of what.
+        /// The name of the quantity.
         name: String,
-        /// How many there are.
+        /// The number of values in the trajectory.
         found: usize,
-        /// How many the problem has.
+        /// The number of values in the problem.
         expected: usize,
     },
-    /// A trajectory that was read has times that are not finite, or decrease.
+    /// The times of a trajectory that was read are not finite, or decrease.
     Times,
     /// A trajectory that was read has values without a time.
     Beyond {
-        /// Of what.
+        /// The name of the quantity.
         name: String,
-        /// Which time is that of the first value.
+        /// The index of the time of the first value.
         first: usize,
-        /// How many values there are.
+        /// The number of values.
         found: usize,
-        /// How many times the trajectory has.
+        /// The number of times of the trajectory.
         times: usize,
     },
-    /// The problem refuses a value.
+    /// The problem rejects a value.
     Problem(Box<OcpError>),
 }
 

@@ -20,19 +20,19 @@ use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// What constraints are called.
+/// The names of constraints.
 pub(in crate::ocp) fn constraint_names<C: Constraints<S, T>, S: Shape, T: Real>()
 -> impl Iterator<Item = String> {
     (0..C::ROWS).map(|row| output_name::<C, S, T>(row).to_string())
 }
 
-/// The unit of a variable, if one is known.
+/// The unit of a variable; empty if it is unknown.
 fn unit_at(units: &'static [&'static str], index: usize) -> &'static str {
     units.get(index).copied().unwrap_or_default()
 }
 
 impl Names {
-    /// What a state of the QP is.
+    /// The kind of a state of the QP.
     pub(super) fn state_kind(&self, state: usize) -> Kind {
         match state.checked_sub(self.model_state_count()) {
             None => Kind::State,
@@ -42,19 +42,19 @@ impl Names {
     }
 }
 
-/// Where bounds and multipliers of one kind are in a stage.
+/// Access to the bounds and multipliers of one kind in a stage.
 struct BoundAccess<T> {
     bounds: for<'a> fn(&Stage<'a, T>) -> Bounds<'a, T>,
     multipliers: for<'a> fn(&SolutionStage<'a, T>) -> [&'a [T]; 2],
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The iterate by names, with algebraic states and constraints at it, bounds and multipliers:
-    /// after a solver the solution. Intervals are integrated once more where the model has
-    /// algebraic states.
+    /// Returns the iterate by names, with algebraic states, constraints, bounds and multipliers;
+    /// after a run of a solver this is the solution. A model with algebraic states is integrated
+    /// once more.
     ///
     /// # Errors
-    /// As [`Ocp::linearise`].
+    /// The errors of [`Ocp::linearise`].
     pub fn solution(&mut self) -> Result<Trajectory<T>, OcpError> {
         self.check()?;
         let (intervals, layout) = (self.intervals(), self.layout());
@@ -141,7 +141,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Trajectory { model, times, time_unit, series })
     }
 
-    /// A state, or what is one in the QP: a linear control or an integral.
+    /// The series of a state of the QP: a state, a linear control or an integral.
     fn state_series(&self, i: usize, places: &BoundAccess<T>) -> Series<T> {
         let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
         let kind = model_names.state_kind(i);
@@ -154,7 +154,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state
     }
 
-    /// Algebraic states of the iterate.
+    /// Computes the algebraic states of the iterate.
     pub(in crate::ocp) fn update_algebraic(&mut self) -> Result<(), OcpError> {
         if self.inner_points.count() > 0 {
             return self.simulate_pieces(None, |_, _| {});
@@ -169,7 +169,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// A free parameter, with its bounds and multipliers at every node: it is one variable.
+    /// The series of a free parameter, which is one variable, with its bounds and multipliers at
+    /// every node.
     fn free_parameter_series(&self, name: &'static str, w: usize, places: &BoundAccess<T>) -> Series<T> {
         let nodes = self.intervals() + 1;
         let value = self.iterate.stages().next().map_or(T::ZERO, |stage| get(stage.u, w));
@@ -185,7 +186,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         series
     }
 
-    /// With the bounds and multipliers of states or controls.
+    /// Adds the bounds and multipliers of states or controls to a series.
     fn with_bounds_and_multipliers(
         &self,
         mut series: Series<T>,
@@ -204,8 +205,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         series
     }
 
-    /// An output of the constraints, of whose values those of the last stage lie behind those of
-    /// all others.
+    /// The series of an output of constraints. The values of the last stage follow those of all
+    /// others.
     fn constraint_series(&self, kind: Kind, name: String, row: usize, values: &[T]) -> Series<T> {
         let intervals = self.intervals();
         let stages = if kind == Kind::Terminal { intervals..intervals + 1 } else { 0..intervals };
@@ -218,7 +219,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         series
     }
 
-    /// Gives a series the bounds and multipliers of a row.
+    /// Adds the bounds and multipliers of a row to a series.
     fn set_row_bounds(&self, series: &mut Series<T>, row: usize) {
         let layout = self.layout();
         let stages = series.first..series.first + series.values.len();
@@ -234,7 +235,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The row of an algebraic state at nodes, if it has bounds.
+    /// The row of the bounds of an algebraic state at nodes, if it has bounds.
     pub(super) fn algebraic_bound_row(&self, variable: usize) -> Option<usize> {
         let index = self.inner_points.bounded_variables().iter().position(|&row| row == (variable, 0))?;
         Some(node_row_count::<P, T>() + self.inner_points.count() * P::Path::ROWS + index)

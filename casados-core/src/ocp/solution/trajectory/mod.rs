@@ -1,14 +1,14 @@
-//! A solution by the names of its variables, with nothing of the problem that it is of.
+//! Solutions by the names of their variables, independent of the problem.
 //!
 //! | | |
 //! | --- | --- |
-//! | `collect` | the iterate of a problem as a trajectory |
-//! | `between` | the same with points between the nodes |
+//! | `from_iterate` | the iterate of a problem as a trajectory |
+//! | `dense_solution` | the iterate with points between the nodes |
 //! | `read` | a trajectory from a file, checked |
 //! | `restore` | a trajectory as the iterate of a problem, or as its guess |
 //! | `csv` | a table for other programs |
 //! | `series` | one quantity over time |
-//! | `violations` | which bounds a trajectory is beyond |
+//! | `violations` | violated bounds of a trajectory |
 
 mod csv;
 mod dense_solution;
@@ -31,10 +31,10 @@ use crate::scalar::Real;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// A solution over time: states, algebraic states, controls, parameters and constraints, each by
-/// its name, with bounds and multipliers. [`Ocp::solution`](crate::ocp::Ocp::solution) makes one.
+/// A solution over time: states, algebraic states, controls, parameters and constraints by names,
+/// with bounds and multipliers. It is created by [`Ocp::solution`](crate::ocp::Ocp::solution).
 ///
-/// It owns all that it has: it may outlive the problem, be compared, be written to a file (feature
+/// It owns its data: it may outlive the problem, be compared, be written to a file (feature
 /// `serde`, or [`Trajectory::csv`]), and become the iterate of a problem again by
 /// [`Ocp::restore`](crate::ocp::Ocp::restore).
 ///
@@ -78,13 +78,13 @@ use alloc::vec::Vec;
 pub struct Trajectory<T = f64> {
     model: String,
     times: Vec<T>,
-    /// The unit of the times, or an empty text.
+    /// The unit of the times; empty if it is unknown.
     time_unit: String,
     series: Vec<Series<T>>,
 }
 
 impl<T: Real> Trajectory<T> {
-    /// Of a model, with the unit of its times.
+    /// Creates the trajectory of a model, with the unit of its times.
     pub(in crate::ocp) fn from_series(
         (model, time_unit): (&str, &str),
         times: Vec<T>,
@@ -93,10 +93,8 @@ impl<T: Real> Trajectory<T> {
         Self { model: model.into(), times, time_unit: time_unit.into(), series }
     }
 
-    /// The last of the times: the end of the horizon, which may have been
-    /// [found](crate::ocp::Horizon::free).
-    ///
-    /// [Horizon::free]: crate::ocp::Horizon::free
+    /// The last time: the end of the horizon, which may have been
+    /// [optimised](crate::ocp::Horizon::free).
     #[must_use]
     pub fn end_time(&self) -> T {
         self.times.last().copied().unwrap_or(T::ZERO)
@@ -108,14 +106,14 @@ impl<T: Real> Trajectory<T> {
         &self.model
     }
 
-    /// The unit of the times, if it is known.
+    /// The unit of the times; empty if it is unknown.
     #[must_use]
     pub fn time_unit(&self) -> &str {
         &self.time_unit
     }
 
-    /// Says the unit of all that a name means, or with the name `t` that of the times: pictures
-    /// show it. Units in doc comments of the model are there without this call.
+    /// Sets the unit of all quantities with a name, or of the times for the name `t`, for plots.
+    /// Units in doc comments of the model need no such call.
     ///
     /// ```
     /// # use casados::ocp::{Horizon, Problem};
@@ -141,7 +139,7 @@ impl<T: Real> Trajectory<T> {
         let mut matching_series = self.series.iter_mut().filter(|series| series.matches(name)).peekable();
         if matching_series.peek().is_none() {
             drop(matching_series);
-            // The error that lists the names.
+            // This error lists the names.
             self.get(name)?;
             return Ok(self);
         }
@@ -155,7 +153,7 @@ impl<T: Real> Trajectory<T> {
         &self.times
     }
 
-    /// All that there is, in the order of [`Kind`], and of the model.
+    /// All series, in the order of [`Kind`], then of the model.
     #[must_use]
     pub fn series(&self) -> &[Series<T>] {
         &self.series
@@ -168,9 +166,9 @@ impl<T: Real> Trajectory<T> {
         times.get(..series.values.len()).unwrap_or_default()
     }
 
-    /// A quantity by its name. That of several (`x` of `x[0]` and `x[1]`) is enough where there is
-    /// one, and so is `speed` of `x.speed`. Where something of more than one [`Kind`] is called so,
-    /// the first is meant.
+    /// Returns a quantity by its name. The name without index (`x` for `x[0]`) suffices if there is
+    /// only one element, and `speed` suffices for `x.speed`. If quantities of several [`Kind`]s
+    /// match, those of the first kind are considered.
     ///
     /// # Errors
     /// [`TrajectoryError::Unknown`], [`TrajectoryError::Ambiguous`]
@@ -179,8 +177,8 @@ impl<T: Real> Trajectory<T> {
         self.find_series(name, |series| kind.is_none_or(|kind| series.kind == kind))
     }
 
-    /// Everything of a kind at one of the times, as a struct of the model; `None` where there is
-    /// nothing, or not as much.
+    /// Returns all quantities of a kind at one time, as a struct of the model; `None` if values are
+    /// missing.
     ///
     /// ```
     /// use casados::ocp::{Horizon, Kind, Problem};
@@ -240,23 +238,23 @@ impl<T: Real> Trajectory<T> {
     /// A state at every point.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn state(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::State)?.values)
     }
 
-    /// An algebraic state at every point but the last.
+    /// An algebraic state at every point except the last.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn algebraic(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Algebraic)?.values)
     }
 
-    /// A control at every point but the last; one that is linear in intervals at every point.
+    /// A control at every point except the last; a linear control at every point.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn control(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Control)?.values)
     }
@@ -264,7 +262,7 @@ impl<T: Real> Trajectory<T> {
     /// The rate of a linear control in every interval: `du` of `u`.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn rate(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Rate)?.values)
     }
@@ -272,7 +270,7 @@ impl<T: Real> Trajectory<T> {
     /// An integral from the start to every node.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn integral(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Integral)?.values)
     }
@@ -280,15 +278,15 @@ impl<T: Real> Trajectory<T> {
     /// A parameter at every node.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn parameter(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Parameter)?.values)
     }
 
-    /// An output of the path constraints at every node but the last.
+    /// An output of the path constraints at every node except the last.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn constraint(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Path)?.values)
     }
@@ -296,34 +294,34 @@ impl<T: Real> Trajectory<T> {
     /// An output of the terminal constraints.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn terminal(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Terminal)?.values)
     }
 
-    /// A path constraint or a bounded variable at a point inside of every interval, a part of it:
-    /// `Speed@0.5`.
+    /// A path constraint or a bounded variable at a point inside every interval, named by its
+    /// fraction of the interval: `Speed@0.5`.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn inside(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::Inside)?.values)
     }
 
-    /// `λ_upper − λ_lower` of the bounds of a state, control or constraint at every node that has
-    /// one: positive where the upper bound holds it back.
+    /// `λ_upper − λ_lower` of the bounds of a state, control or constraint at every node: positive
+    /// if the upper bound is active.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn multiplier(&self, name: &str) -> Result<Vec<T>, TrajectoryError> {
         Ok(self.get(name)?.multipliers())
     }
 
-    /// The multipliers `π_{k+1}` of the dynamics of a state, one for each interval: what a unit of
-    /// this state more at the end of the interval adds to the objective.
+    /// The multipliers `π_{k+1}` of the dynamics of a state, one for each interval: the derivative
+    /// of the objective with respect to this state at the end of the interval.
     ///
     /// # Errors
-    /// As [`Trajectory::get`].
+    /// The errors of [`Trajectory::get`].
     pub fn costate(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.series_of_kind(name, Kind::State)?.costates)
     }

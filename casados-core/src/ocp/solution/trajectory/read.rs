@@ -1,4 +1,4 @@
-//! A trajectory as it is read: what no problem writes is an error.
+//! Checks of trajectories that are read.
 
 use super::{Kind, Series, Trajectory, TrajectoryError};
 use crate::scalar::Real;
@@ -30,7 +30,8 @@ impl<T: Real> TryFrom<Unchecked<T>> for Trajectory<T> {
 }
 
 impl<T> Series<T> {
-    /// Its values lie within so many times, and what belongs to them is as long or empty.
+    /// Checks that the values have times, and that bounds and multipliers have as many elements as
+    /// the values, or none.
     fn check(&self, times: usize) -> Result<(), TrajectoryError> {
         let fits = |found: usize, expected: usize| match found == expected {
             true => Ok(()),

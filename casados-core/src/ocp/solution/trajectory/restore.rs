@@ -12,17 +12,17 @@ use crate::scalar::Real;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Where values and multipliers of a kind are in a stage: values, `λ` of both sides.
+/// Access to one kind in a stage: values, multipliers of lower and of upper bounds.
 type StageAccess<T> = for<'a, 'b> fn(&'b mut SolutionStageMut<'a, T>) -> [&'b mut [T]; 3];
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes a trajectory the iterate, with its multipliers: a run that starts warm goes on from
-    /// there. It is that of a problem with the same names and as many stages: one that was saved.
+    /// Makes a trajectory the iterate, with its multipliers, so that a warm-started run continues
+    /// from it. The trajectory must be that of a problem with the same names and number of stages.
     ///
     /// # Errors
-    /// [`TrajectoryError::Unknown`] of what the trajectory has not, [`TrajectoryError::Length`];
-    /// [`TrajectoryError::Problem`] where a value is not finite. Then the iterate is as it was, but
-    /// in the last case.
+    /// [`TrajectoryError::Unknown`] for missing quantities, [`TrajectoryError::Length`];
+    /// [`TrajectoryError::Problem`] if a value is not finite. The iterate is unchanged except in
+    /// the last case.
     pub fn restore(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
         let intervals = self.intervals();
         let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
@@ -38,7 +38,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             (Kind::Path, constraint_names::<P::Path, _, T>().collect(), row_access),
             (Kind::Terminal, constraint_names::<P::Terminal, _, T>().collect(), row_access),
         ];
-        // All is found before anything is written.
+        // All series are found before the iterate is changed.
         let mut found = Vec::new();
         for (kind, names, places) in kinds {
             let (first, count) = match kind {
@@ -54,7 +54,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     Kind::Control if model_names.linear_state(index).is_some() => Kind::Rate,
                     kind => kind,
                 };
-                // Functions that are there twice have the same names, in the same order.
+                // Repeated functions have the same names, in the same order.
                 let series = match of_kind.get(index).filter(|series| series.name == name) {
                     Some(&series) => series,
                     None => trajectory.series_of_kind(&name, series_kind)?,
@@ -110,14 +110,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// Makes a trajectory the guess, with states between its points on straight lines and the
-    /// controls that hold there, free parameters where it has them, and no multipliers: horizons
-    /// may differ, as those of a coarse and
-    /// a fine grid. Before its first time and after its last one the nearest values are taken.
+    /// Makes a trajectory the guess: states are interpolated linearly between its points, controls
+    /// are those that apply at a time, free parameters are copied if it has them, and multipliers
+    /// are zero. Horizons may differ, as between a coarse and a fine grid. Outside its times the
+    /// nearest values are taken.
     ///
     /// # Errors
-    /// [`TrajectoryError::Unknown`] of a state or control that it has not;
-    /// [`TrajectoryError::Problem`] where a value is not finite.
+    /// [`TrajectoryError::Unknown`] for a missing state or control; [`TrajectoryError::Problem`] if
+    /// a value is not finite.
     ///
     /// # Example
     /// ```
@@ -166,7 +166,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             };
             x.extend(states.iter().map(|series| linear(series)));
             if k < self.intervals() || !model_names.linear.is_empty() {
-                // One that is linear has a value at the last time too.
+                // A linear control has a value at the last time too.
                 let is_linear = |series: &Series<T>| series.values.len() == trajectory.times.len();
                 let at = |series: &&Series<T>| match is_linear(series) {
                     true => linear(series),
@@ -188,8 +188,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The point at or before a time, but for rounding, and which part of the way to the next one it
-/// is.
+/// Returns the point at or before a time, up to rounding errors, and the fraction of the interval
+/// from there.
 fn interval_and_fraction<T: Real>(times: &[T], time: T) -> (usize, T) {
     let rounding =
         T::from_f64(16.0 * T::EPSILON) * (element_or_last(times, times.len()) - element_or_last(times, 0));
@@ -204,7 +204,7 @@ fn element_or_last<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).or(values.last()).copied().unwrap_or(T::ZERO)
 }
 
-/// Whether a series has these lengths: values, multipliers of both sides, costates.
+/// Checks the lengths of a series: values, multipliers of lower and upper bounds, costates.
 fn check_lengths<T>(series: &Series<T>, expected: [usize; 4]) -> Result<(), TrajectoryError> {
     let Series { values, lower_multipliers, upper_multipliers, costates, name, .. } = series;
     let lists = [values, lower_multipliers, upper_multipliers, costates].map(Vec::len);

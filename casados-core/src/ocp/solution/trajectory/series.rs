@@ -5,7 +5,7 @@ use crate::structure::name_matches;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// What a [`Series`] is of.
+/// The kind of a [`Series`].
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, Kind, LeastSquaresCost, Map, Problem};
@@ -29,28 +29,28 @@ use alloc::vec::Vec;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Kind {
-    /// A state: at every node.
+    /// A state, at every node.
     State,
     /// An algebraic state, at the start of every interval.
     Algebraic,
-    /// A control, constant over every interval; one that is linear in intervals is at every node.
+    /// A control, constant in every interval; or a linear control, at every node.
     Control,
-    /// A parameter: at every node.
+    /// A parameter, at every node.
     Parameter,
     /// An output of a path constraint, at the start of every interval.
     Path,
-    /// An output of a terminal constraint: at the last node.
+    /// An output of a terminal constraint, at the last node.
     Terminal,
-    /// A path constraint or a bounded variable at a point inside of every interval
+    /// A path constraint or a bounded variable at a point inside every interval
     /// ([`Ocp::inside`](crate::ocp::Ocp::inside)): `Speed@0.5`.
     Inside,
-    /// The rate of a control that is linear in intervals.
+    /// The rate of a linear control.
     Rate,
     /// An integral from the start to every node.
     Integral,
 }
 
-/// One quantity over time. Lists of what it has not are empty.
+/// One quantity over time. Lists of missing data are empty.
 ///
 /// ```
 /// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -77,30 +77,29 @@ pub enum Kind {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Series<T = f64> {
-    /// What it is of.
+    /// The kind of the quantity.
     pub kind: Kind,
-    /// Its name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
-    /// several: `Distance`, `Corner[2]`; what is at a point inside of intervals with
-    /// the part of these: `Distance@0.5`.
+    /// The name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
+    /// several: `Distance`, `Corner[2]`; the fraction of the interval for points inside intervals:
+    /// `Distance@0.5`.
     pub name: String,
-    /// Its unit as the doc comments of the model say it
-    /// ([`Units`](crate::structure::Units)), or
-    /// [`set_unit`](super::Trajectory::set_unit) did; empty if nobody did.
+    /// The unit, from the doc comments of the model ([`Units`](crate::structure::Units)) or from
+    /// [`set_unit`](super::Trajectory::set_unit); empty if unknown.
     #[cfg_attr(feature = "serde", serde(default))]
     pub unit: String,
-    /// Which time is that of the first value.
+    /// The index of the time of the first value.
     pub first: usize,
     /// The values.
     pub values: Vec<T>,
-    /// Lower bounds of the values, where there are some.
+    /// Lower bounds of the values, if any.
     pub lower: Vec<Option<T>>,
-    /// Upper bounds.
+    /// Upper bounds of the values, if any.
     pub upper: Vec<Option<T>>,
-    /// Multipliers of the lower bounds, from zero on.
+    /// Multipliers of the lower bounds, at least zero.
     pub lower_multipliers: Vec<T>,
-    /// Multipliers of the upper bounds, from zero on.
+    /// Multipliers of the upper bounds, at least zero.
     pub upper_multipliers: Vec<T>,
-    /// Of a state the multipliers `π_{k+1}` of the dynamics, one for each interval.
+    /// The multipliers `π_{k+1}` of the dynamics of a state, one for each interval.
     pub costates: Vec<T>,
 }
 
@@ -120,25 +119,25 @@ impl<T: Real> Series<T> {
         }
     }
 
-    /// With a unit.
+    /// Sets the unit.
     pub(in crate::ocp) fn with_unit(self, unit: impl Into<String>) -> Self {
         Self { unit: unit.into(), ..self }
     }
 
-    /// Whether a name means it; of `x.cart.position` also `cart.position`.
+    /// Whether a name matches; `cart.position` matches `x.cart.position`.
     pub(super) fn matches(&self, name: &str) -> bool {
         let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
         name_matches(name, &self.name) || field.is_some_and(|field| name_matches(name, field))
     }
 
-    /// `λ_upper − λ_lower` of every value: positive where the upper bound holds it back.
+    /// `λ_upper − λ_lower` of every value: positive if the upper bound is active.
     #[must_use]
     pub fn multipliers(&self) -> Vec<T> {
         self.upper_multipliers.iter().zip(&self.lower_multipliers).map(|(&u, &l)| u - l).collect()
     }
 
-    /// By how much every value is beyond its bounds, zero inside of them: of soft bounds this is
-    /// the slack, which has a penalty.
+    /// The violation of every value, zero inside the bounds; for soft bounds this is the slack with
+    /// a penalty.
     #[must_use]
     pub fn violations(&self) -> Vec<T> {
         let violation = |k: usize, value: T| {
@@ -150,7 +149,7 @@ impl<T: Real> Series<T> {
         self.values.iter().enumerate().map(|(k, &value)| violation(k, value)).collect()
     }
 
-    /// Whether a value is at one of its bounds, to a distance, or beyond it.
+    /// Whether a value is within a distance of one of its bounds, or violates it.
     #[must_use]
     pub fn is_active(&self, index: usize, distance: T) -> bool {
         let Some(&value) = self.values.get(index) else { return false };

@@ -1,4 +1,4 @@
-//! Which bounds a trajectory is beyond, by name.
+//! Violated bounds of a trajectory, by name.
 
 use super::Trajectory;
 use super::series::bound_at;
@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use core::cmp::Ordering;
 use core::fmt;
 
-/// A bound that a trajectory is beyond.
+/// A violated bound of a trajectory.
 ///
 /// ```
 /// # use casados::ocp::*;
@@ -32,13 +32,13 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Violation<'a, T = f64> {
-    /// The state, control or output of a constraint.
+    /// The name of the state, control or output of a constraint.
     pub name: &'a str,
-    /// Which of the times of the trajectory: of a solution the stage.
+    /// The index of the time; for a solution the stage.
     pub stage: usize,
-    /// The side.
+    /// The violated side.
     pub side: Side,
-    /// By how much.
+    /// The amount of the violation.
     pub amount: T,
 }
 
@@ -55,8 +55,8 @@ impl<T: Real> fmt::Display for Violation<'_, T> {
 }
 
 impl<T: Real> Trajectory<T> {
-    /// The bounds that values are beyond by more than this, the largest violation first: after a
-    /// run that did not converge those that may contradict each other.
+    /// Returns the violations above a threshold, largest first. After a run that did not converge
+    /// these bounds may contradict each other.
     #[must_use]
     pub fn violations(&self, above: T) -> Vec<Violation<'_, T>> {
         let mut found = Vec::new();

@@ -1,14 +1,14 @@
 //! Products of columns with a vector. Their sums lie in the lanes of one register: a vector that is
-//! written whole and read at once does not wait for the memory.
+//! stored by whole registers is loaded again without a stall.
 
 use super::{Columns, MAX_LANES, Source, chunk, lane_indices};
 use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
-/// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
-/// be zero in one of them. What of the target is no whole register is computed one number after the
-/// other.
+/// Computes `target + Xᵀ v`: `columns` dot products of columns of `X` with `v`, of `rows` elements.
+/// The padding of one factor must be zero. Elements of the target past its last whole register are
+/// computed one by one.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn add_transposed<T: Real, E: Packed<T>>(
@@ -24,7 +24,8 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
     sum_transposed::<T, E>(target, Source::Target, x, v, (rows, columns));
 }
 
-/// `target = source + Xᵀ v` of a target of whole registers. Behind the columns it is the source.
+/// Computes `target = source + Xᵀ v` for a target of whole registers. Past the columns it is the
+/// source.
 #[inline(always)]
 pub fn sum_transposed<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -38,7 +39,7 @@ pub fn sum_transposed<T: Real, E: Packed<T>>(
     }
 }
 
-/// The same one number after the other.
+/// As [`add_transposed`], one number at a time.
 #[inline(always)]
 fn add_dots<T: Real>(target: &mut [T], x: Columns<'_, T>, v: &[T], (rows, columns): (usize, usize)) {
     let v = v.get(..rows).unwrap_or_default();
@@ -49,7 +50,7 @@ fn add_dots<T: Real>(target: &mut [T], x: Columns<'_, T>, v: &[T], (rows, column
     }
 }
 
-/// A product as a function of its own.
+/// A product as a separate function.
 struct AddTransposed<'a, T, E> {
     target: &'a mut [T],
     source: Source<'a, T>,
@@ -87,8 +88,8 @@ impl<T: Real, E: Packed<T>> Piece for AddTransposed<'_, T, E> {
     }
 }
 
-/// `u − Kᵀ x` in place of `u` in `v = (x, u)`, where `u` is zero and `feedforward` has it. Rows of
-/// `K` behind those of states are zero.
+/// Computes the controls `u − Kᵀ x` of `v = (x, u)`, whose `u` is zero, from `u` in `feedforward`.
+/// Rows of `K` past the states are zero.
 #[inline(always)]
 pub fn add_feedback<T: Real, E: Packed<T>>(
     v: &mut [T],
@@ -113,7 +114,7 @@ pub fn add_feedback<T: Real, E: Packed<T>>(
     }
 }
 
-/// The lanes from one on, so many.
+/// Returns the mask of `count` lanes from `first` on.
 #[inline(always)]
 pub fn lanes<T: Real, E: Packed<T>>(first: usize, count: usize) -> E::Mask {
     let (index, half) = (lane_indices::<T, E>(), 0.5);
@@ -121,7 +122,7 @@ pub fn lanes<T: Real, E: Packed<T>>(first: usize, count: usize) -> E::Mask {
     E::and(E::lt(E::from_f64(begin), index), E::lt(index, E::from_f64(end)))
 }
 
-/// `−Xᵀ v` of some columns, in the lanes from one on; zero in the others.
+/// Computes `−Xᵀ v` of `columns` columns, in the lanes from `lane` on; other lanes are zero.
 #[inline(always)]
 fn negative_dots<T: Real, E: Packed<T>>(
     x: Columns<'_, T>,
@@ -139,8 +140,8 @@ fn negative_dots<T: Real, E: Packed<T>>(
     if columns == E::LANES { sums } else { E::select(lanes::<T, E>(lane, columns), sums, E::from_f64(0.0)) }
 }
 
-/// The same in `C` lanes; in the others is something. Lanes before and behind those of the columns
-/// have the sums of the first and of the last one.
+/// As [`negative_dots`], in `C` lanes; other lanes are unspecified. Lanes before and after the
+/// columns have the sums of the first and of the last column.
 #[inline(always)]
 #[allow(unsafe_code)]
 fn sums_of_columns<T: Real, E: Packed<T>, const C: usize>(
@@ -161,7 +162,7 @@ fn sums_of_columns<T: Real, E: Packed<T>, const C: usize>(
     for (row, cell) in v.iter().enumerate() {
         let factor = E::load(cell);
         for (sum, &begin) in sums.iter_mut().zip(&begins) {
-            // SAFETY: no column is behind the last one, which has as many rows as `v`.
+            // SAFETY: no column is after the last one, which has as many rows as `v`.
             let [cell] = unsafe { chunk::<_, 1>(cells, begin + row) };
             *sum = sum.minus_product(E::load(cell), factor);
         }
@@ -169,8 +170,8 @@ fn sums_of_columns<T: Real, E: Packed<T>, const C: usize>(
     E::totals(sums.get(..E::LANES).unwrap_or_default())
 }
 
-/// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything.
-/// Target and `v` are padded, `v` with zeros.
+/// Computes `target + H v` with a symmetric matrix stored by its lower triangle; elements above the
+/// diagonal are ignored. Target and `v` are padded, `v` with zeros.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
@@ -187,8 +188,8 @@ pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v:
     }
 }
 
-/// What the columns of one register of variables add to their own rows and, by their transpose, to
-/// the sums of their own: everything from the diagonal on, where the slices begin.
+/// Adds the products of the columns of one register of variables, from the diagonal on, and of
+/// their transpose. The slices start at the diagonal.
 #[inline(always)]
 #[allow(unsafe_code)]
 fn symmetric_columns<T: Real, E: Packed<T>>(
@@ -205,13 +206,13 @@ fn symmetric_columns<T: Real, E: Packed<T>>(
     }
     let mut begins = [0; MAX_LANES];
     for (index, begin) in begins.iter_mut().enumerate() {
-        // Behind the last column the padding of the last one is read, which is zero.
+        // Past the last column, the padding of the last one is read, which is zero.
         *begin = index.min(last) * ld;
     }
     let index = lane_indices::<T, E>();
     let (mut dots, mut diagonal) = ([zero; MAX_LANES], zero);
     for (column, (dot, &begin)) in dots.iter_mut().zip(&begins).enumerate().take(E::LANES) {
-        // SAFETY: no column is behind the last one, which has as many rows as `factors`, of which
+        // SAFETY: no column is after the last one, which has as many rows as `factors`, of which
         // there is one at least.
         let [cell] = unsafe { chunk::<_, 1>(cells, begin) };
         let (value, lane) = (E::load(cell), E::from_f64(column as f64));
@@ -257,7 +258,8 @@ mod tests {
         }
     }
 
-    /// The definition, in targets with padding and without: small integers have exact sums.
+    /// The products by their definition, in targets with and without padding: sums of small
+    /// integers are exact.
     #[test]
     fn transposed_products_of_all_sizes() {
         for case in 0..19 * 19 * 4 {
@@ -296,7 +298,8 @@ mod tests {
         }
     }
 
-    /// The definition, wherever controls lie in registers; states stay as they are.
+    /// The feedback by its definition, for all positions of controls in registers; states are
+    /// unchanged.
     #[test]
     fn feedback_of_all_sizes() {
         for (nx, nu) in (1..20).flat_map(|nx| (0..12).map(move |nu| (nx, nu))) {

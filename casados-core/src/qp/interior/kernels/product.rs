@@ -1,8 +1,8 @@
-//! Matrix products in tiles of registers.
+//! Matrix products in micro-tiles of registers.
 //!
-//! Rows of a tile are registers of `X`, its columns are elements of `Y` in all lanes: two registers
-//! times six elements are twelve sums, and with what they are computed from they leave one of the
-//! sixteen registers of AVX2 free. Three times four leave none, and the compiler then keeps sums in
+//! Rows of a tile are registers of `X`, its columns are elements of `Y` in all lanes. Two registers
+//! times six elements are twelve accumulators; with their operands they leave one of the sixteen
+//! registers of AVX2 free. Three times four leave none: the compiler then spills accumulators to
 //! memory, which takes twice as long.
 
 use super::{Columns, chunk, splat};
@@ -10,17 +10,16 @@ use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// Columns of tiles, which are even: what begins at an even column and is no longer than columns,
-/// whose length is even, does not end behind them. There are twice as many registers of AVX-512 as
-/// of AVX2.
+/// Columns of tiles; they are even, so that a tile that starts at an even column does not exceed a
+/// matrix with an even number of columns. AVX-512 has twice as many registers as AVX2.
 const COLUMNS_AVX512: usize = 8;
 const COLUMNS_AVX2: usize = 6;
 const MIN_TILE_COLUMNS: usize = 4;
 const TWO_COLUMNS: usize = 2;
-/// A product writes up to one column more than it is asked for.
+/// The number of columns that a product may write beyond those requested.
 pub const PADDING_COLUMNS: usize = 1;
 
-/// What a product is subtracted from; zero where it ends.
+/// The minuend of a product; zero beyond its end.
 #[derive(Clone, Copy)]
 pub enum Source<'a, T> {
     /// Zero.
@@ -39,7 +38,8 @@ struct Cells<'a, C> {
     ld: usize,
 }
 
-/// `sums − X Yᵀ` for `R` registers of rows of `X` and `C` rows of `Y`, over `depth` columns.
+/// Computes `sums − X Yᵀ` for `R` registers of rows of `X` and `C` rows of `Y`, over `depth`
+/// columns.
 #[inline(always)]
 #[allow(unsafe_code)]
 fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
@@ -69,19 +69,19 @@ fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
     }
 }
 
-/// Where a product is written, what it is subtracted from, and its factors.
+/// The target of a product, the matrix from which it is subtracted, and its factors.
 struct Operands<'a, T, E: Packed<T>> {
     target: &'a mut [E::Cell],
     ld: usize,
-    /// None, where it is the target.
+    /// `None` if the source is the target.
     source: Option<Cells<'a, E::Cell>>,
     x: Cells<'a, E::Cell>,
     y: Cells<'a, T>,
     depth: usize,
 }
 
-/// A tile of `target = source − X Yᵀ`, from a register of rows and a column on. The source is zero
-/// where it ends, and what is behind the target is not written.
+/// Writes a tile of `target = source − X Yᵀ`, from a register of rows and a column on. The source
+/// is zero past its end; elements past the end of the target are not written.
 #[inline(always)]
 fn write_tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
     all: &mut Operands<'_, T, E>,
@@ -116,7 +116,7 @@ fn write_tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
     }
 }
 
-/// Some registers of rows of `C` columns.
+/// Writes some registers of rows of `C` columns.
 #[inline(always)]
 fn strip<T: Real, E: Packed<T>, const C: usize>(
     all: &mut Operands<'_, T, E>,
@@ -133,20 +133,21 @@ fn strip<T: Real, E: Packed<T>, const C: usize>(
     }
 }
 
-/// Which rows of a product are wanted.
+/// The requested rows of a product.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// All.
+    /// All rows.
     Full,
-    /// Those from the diagonal on; above it some may be written as well.
+    /// The rows from the diagonal on; some rows above it may be written as well.
     Lower,
 }
 
-/// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
+/// Computes `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero beyond
+/// its end.
 ///
-/// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in
-/// its columns. [`PADDING_COLUMNS`] more columns than asked for are written if the target has them,
-/// and rows up to whole registers.
+/// Columns are processed in tiles from the first one on, which must be even, as must be the first
+/// row of `Y` in its columns. [`PADDING_COLUMNS`] more columns than requested are written if the
+/// target has them, and rows up to whole registers.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -171,7 +172,7 @@ pub fn product<T: Real, E: Packed<T>>(
     });
 }
 
-/// A product as a function of its own: the tiles are many instructions.
+/// The arguments of a product, as a separate function: the tiles are large in code size.
 struct Product<'a, T, E> {
     target: &'a mut [T],
     target_ld: usize,
@@ -238,7 +239,7 @@ fn tiles<T: Real, E: Packed<T>>(
     }
 }
 
-/// `target − X y`, `rows` elements, over `depth` columns.
+/// Computes `target − X y`, `rows` elements, over `depth` columns.
 #[inline(always)]
 pub fn subtract<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -250,7 +251,7 @@ pub fn subtract<T: Real, E: Packed<T>>(
     difference::<T, E>(target, Source::Target, x, y, (rows, depth));
 }
 
-/// `target = source − X y`, `rows` elements, over `depth` columns.
+/// Computes `target = source − X y`, `rows` elements, over `depth` columns.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn difference<T: Real, E: Packed<T>>(
@@ -294,7 +295,7 @@ fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
     if depth > 0 && columns.len() < last * ld + R {
         return;
     }
-    // Two sums of each register: half of the products do not wait for the others.
+    // Two sums of each register halve the chain of dependent products.
     let mut sums = [[E::from_f64(0.0); R]; 2];
     let from = match source {
         Source::Zero => None,
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// Every size around the edges of tiles, with memory that ends with the last column.
+    /// All sizes around the limits of tiles, with memory that ends at the last column.
     #[test]
     fn products_of_all_sizes() {
         for (padding, padded) in LEADING_DIMENSIONS.into_iter().enumerate() {

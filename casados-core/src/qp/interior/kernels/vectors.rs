@@ -1,10 +1,10 @@
-//! Products with vectors, in registers.
+//! Products with vectors, by SIMD.
 
 use super::dots::symmetric;
 use super::{MAX_LANES, lane_indices, splat};
 use crate::scalar::{Packed, Real, Registers};
 
-/// `target + H v` as [`symmetric`], for whoever is not in registers yet.
+/// Computes `target + H v` as [`symmetric`], for callers outside a SIMD kernel.
 pub fn add_symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     T::registers(AddSymmetric { target, h, ld, v, n });
 }
@@ -24,7 +24,7 @@ impl<T: Real> Registers<T> for AddSymmetric<'_, T> {
     }
 }
 
-/// `target − factor · column`
+/// Computes `target − factor · column`.
 #[inline(always)]
 pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, column: &[T]) {
     let factor = splat::<T, E>(factor);
@@ -33,7 +33,7 @@ pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, colum
     }
 }
 
-/// `target · factor`
+/// Computes `target · factor`.
 #[inline(always)]
 pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     let factor = splat::<T, E>(factor);
@@ -42,7 +42,7 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     }
 }
 
-/// The upper triangle from the lower one.
+/// Copies the lower triangle to the upper one.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
@@ -68,7 +68,8 @@ pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
     }
 }
 
-/// The same of the block of a register of rows and as many columns, from some row and column on.
+/// As [`mirror`], for a block of one register of rows and as many columns, from `row` and `column`
+/// on.
 #[inline(always)]
 fn mirror_block<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize, [row, column]: [usize; 2]) {
     let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MAX_LANES];
@@ -88,7 +89,7 @@ fn mirror_block<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize, [r
     }
 }
 
-/// Rows of the first register of a matrix of some columns; behind the last one they are zero.
+/// Transposes the first register of rows of a matrix; past the last column, elements are zero.
 #[inline(always)]
 fn transpose_block<T: Real, E: Packed<T>>(
     to: &mut [E::Cell; MAX_LANES],
@@ -110,7 +111,7 @@ fn transpose_block<T: Real, E: Packed<T>>(
     }
 }
 
-/// Adds the transpose of `rows` rows of so many columns, column after column of the target.
+/// Adds the transpose of `rows` rows of `columns` columns.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn add_rows<T: Real, E: Packed<T>>(target: &mut [T], from: &[T], ld: usize, [rows, columns]: [usize; 2]) {
@@ -145,7 +146,7 @@ pub fn copy<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
     }
 }
 
-/// `source − target` in whole registers.
+/// Computes `source − target` in whole registers.
 #[inline(always)]
 pub fn subtract_from<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
     for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
@@ -159,7 +160,8 @@ mod tests {
     use super::*;
     use alloc::vec::Vec;
 
-    /// The definition, with what must not be read above the diagonal.
+    /// The products by their definition; elements above the diagonal, which must not be read, are
+    /// NaN.
     #[test]
     fn symmetric_products_of_all_sizes() {
         for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {
@@ -196,7 +198,7 @@ mod tests {
         }
     }
 
-    /// The definition, of matrices of one register and of several.
+    /// The definition, for matrices of one register and of several.
     #[test]
     fn transposes_of_all_sizes() {
         for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {

@@ -1,15 +1,14 @@
-//! What elementary functions are computed with: a register of doubles, or two of them abreast.
+//! The operands of elementary functions: a register of doubles, or two interleaved ones.
 //!
-//! Nearly every operation of an elementary function waits for the one before. Of two registers, or
-//! two times two, each operation is made on both before the next, so that the processor has work
-//! meanwhile. Of functions one after the other it would have to find that among instructions that
-//! are further ahead than it looks.
+//! Nearly every operation of an elementary function depends on the one before. With two registers,
+//! or two times two, each operation is applied to both before the next, so that the processor is
+//! not idle. For separate functions the independent instructions would lie beyond its look-ahead.
 
 use super::{DoubleRegister, each};
 use crate::scalar::{Field, Lanes, Scalar};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Two numbers with which the same is done.
+/// Two interleaved numbers.
 #[derive(Clone, Copy)]
 pub struct Two<D>(pub D, pub D);
 
@@ -34,7 +33,7 @@ impl<D: Double> Neg for Two<D> {
     }
 }
 
-/// The trait of these numbers, that of a register, and that of two.
+/// Defines the trait of these operands, with its implementations for one register and for two.
 macro_rules! operations {
     (
         unary { $($(#[$of_unary:meta])* $unary:ident = $by_unary:ident;)* }
@@ -44,7 +43,7 @@ macro_rules! operations {
         compare { $($(#[$of_compare:meta])* $compare:ident;)* }
         combine { $($(#[$of_combine:meta])* $combine:ident;)* }
     ) => {
-        /// A number, or several with which the same is done. Bit patterns are written as doubles.
+        /// A number, or several interleaved ones. Bit patterns are written as doubles.
         pub trait Double:
             Copy
             + Add<Output = Self>
@@ -66,13 +65,13 @@ macro_rules! operations {
             $($(#[$of_shift])* fn $shift<const BITS: i32>(self) -> Self;)*
             $($(#[$of_compare])* fn $compare(self, other: Self) -> Self::Mask;)*
             $($(#[$of_combine])* fn $combine(a: Self::Mask, b: Self::Mask) -> Self::Mask;)*
-            /// Neither infinite nor NaN.
+            /// Whether the number is neither infinite nor NaN.
             fn is_finite(self) -> Self::Mask;
             /// not
             fn not(mask: Self::Mask) -> Self::Mask;
             /// `if mask { a } else { b }`
             fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-            /// Replaces what is rare of `result` by what a function of one number, or two, gives.
+            /// Replaces rare lanes of `result` by the value of a function of one or two numbers.
             fn replace<F: Copy>(
                 rare: Self::Mask,
                 arguments: [Self; 2],
@@ -230,7 +229,7 @@ operations! {
     abs = Scalar;
     }
     binary {
-    /// The larger one; `other` if one of them is NaN.
+    /// The larger one; `other` if one is NaN.
     max = Lanes;
     /// bitwise and
     and_bits = DoubleRegister;
@@ -242,15 +241,15 @@ operations! {
     add_bits = DoubleRegister;
     }
     ternary {
-    /// `self a + b`, in one instruction if there is one, else rounded twice.
+    /// `self a + b`, in one instruction if available, otherwise rounded twice.
     mul_add = DoubleRegister;
     /// `self − a b`
     subtract_product = Field;
     }
     shift {
-    /// The bits moved up, zeros below.
+    /// Shifts the bits up; zeros enter below.
     shift_left;
-    /// The bits moved down, zeros above.
+    /// Shifts the bits down; zeros enter above.
     shift_right;
     }
     compare {

@@ -1,7 +1,7 @@
-//! `eᵃ` and what is made of it.
+//! `eᵃ` and functions based on it.
 //!
 //! `a = n ln 2 + r` with `|r| ≤ ln 2 / 2` (Cody and Waite), `eʳ = 1 + r + r² Q(r)` with a minimax
-//! polynomial, whose leading terms are added as a pair.
+//! polynomial, whose leading terms are added in double-double arithmetic.
 
 use super::pair::{DoubleDouble, constant, exact_ordered_sum, exact_product, exact_sum, polynomial};
 use super::rounding::{LN_2_PARTS, clamp, copy_sign, power_of_two, round_to_integer};
@@ -30,13 +30,13 @@ const EXP_POLYNOMIAL: [f64; 11] = [
 #[inline(always)]
 fn reduce_modulo_ln_2<D: Double>(a: D) -> (D, DoubleDouble<D>) {
     let n = round_to_integer(a * constant(core::f64::consts::LOG2_E));
-    // Both exact: the first constant leaves eleven bits for n.
+    // Both are exact: the first constant has eleven zero bits for the product with n.
     let first = a - n * constant(LN_2_PARTS[0]);
     let second = n * constant(LN_2_PARTS[1]);
     (n, exact_ordered_sum(first, -second))
 }
 
-/// What `eʳ − 1` gains by the lower part of `r`.
+/// The contribution of the lower part of `r` to `eʳ − 1`.
 #[inline(always)]
 fn low_part_correction<D: Double>(r: DoubleDouble<D>) -> D {
     r.low.mul_add(r.high, r.low)
@@ -104,7 +104,7 @@ fn half_exp_m1<D: Double>(a: D) -> DoubleDouble<D> {
 #[inline(always)]
 pub fn exp_m1<D: Double>(a: D) -> D {
     let half = half_exp_m1(clamp(a, -60.0, 709.9)).round();
-    // Of a tiny number only the number itself, with its sign, is left.
+    // For a tiny number the result is the number itself, with its sign.
     D::select(a.abs().lt(constant(1e-20)), a, half + half)
 }
 
@@ -124,7 +124,7 @@ const SINH_POLYNOMIAL: [f64; 7] = [
 fn half_exponentials<D: Double>(magnitude: D) -> (DoubleDouble<D>, DoubleDouble<D>) {
     let (n, r) = reduce_modulo_ln_2(clamp(magnitude, 0.0, 711.0));
     let near = exp_reduced(r).normalise();
-    // In two steps, because 2¹⁰²⁴ is no double. What falls below 2⁻¹⁰⁰⁰ counts for nothing.
+    // In two factors, because 2¹⁰²⁴ is no double. Values below 2⁻¹⁰⁰⁰ are negligible.
     let rising =
         near.scale_by_power_of_two(power_of_two(n - constant(2.0))).scale_by_power_of_two(constant(2.0));
     let falling = DoubleDouble::new(constant(0.5))
@@ -162,16 +162,16 @@ pub fn tanh<D: Double>(a: D) -> D {
     copy_sign(D::select(tiny, magnitude, quotient), a)
 }
 
-/// `aᵇ = exp(b ln a)`, the logarithm to about 65 bits. Unusual arguments are left to the function
-/// of one number.
+/// `aᵇ = exp(b ln a)`, with the logarithm to about 65 bits. Rare arguments use the function of one
+/// number.
 #[inline(always)]
 pub fn powf<D: Double>((a, b): (D, D)) -> D {
     let usual = D::and(constant::<D>(f64::MIN_POSITIVE).le(a), a.le(constant(f64::MAX)));
-    // Whatever comes out of what is not usual, or does not fit, is mended.
+    // Results of rare arguments and overflows are replaced below.
     let logarithm = super::logarithm::ln_pair(a);
     let exponent = exact_product(logarithm.high, b);
     let low = logarithm.low.mul_add(b, exponent.low);
-    // The product of a logarithm of zero and a large number has no lower part.
+    // The product of a zero logarithm and a large number has no lower part.
     let fits = D::and(exponent.high.abs().lt(constant(700.0)), b.abs().lt(constant(1e100)));
     let (n, r) = reduce_modulo_ln_2(exponent.high);
     let r = exact_ordered_sum(r.high, r.low + low);

@@ -41,7 +41,7 @@ const MANTISSA_BITS: u64 = 0x000F_FFFF_FFFF_FFFF;
 fn split_exponent<D: Double>(a: D) -> (D, D) {
     let shifted = a.add_bits(bit_pattern(1.0_f64.to_bits() - SQRT_HALF));
     let biased = shifted.shift_right::<52>();
-    // An integer below 2⁵² is a double when it is put into the last bits of 2⁵².
+    // An integer below 2⁵² in the last bits of 2⁵² is the double 2⁵² plus that integer.
     let k = biased.or_bits(constant(4_503_599_627_370_496.0)) - constant(4_503_599_627_370_496.0 + 1023.0);
     (k, shifted.and_bits(bit_pattern(MANTISSA_BITS)).add_bits(bit_pattern(SQRT_HALF)))
 }
@@ -58,7 +58,7 @@ fn ln_1p_reduced<D: Double>(f: DoubleDouble<D>) -> DoubleDouble<D> {
     twice_artanh(f.div(DoubleDouble::new(constant(2.0)).add_smaller(f)))
 }
 
-/// The same of a double.
+/// As [`ln_1p_reduced`], for a double.
 #[inline(always)]
 fn ln_1p_reduced_of_double<D: Double>(f: D) -> DoubleDouble<D> {
     twice_artanh(DoubleDouble::quotient(f, exact_ordered_sum(constant(2.0), f)))
@@ -68,7 +68,7 @@ fn ln_1p_reduced_of_double<D: Double>(f: D) -> DoubleDouble<D> {
 #[inline(always)]
 fn twice_artanh<D: Double>(s: DoubleDouble<D>) -> DoubleDouble<D> {
     let z = s.mul(s);
-    // What this rounds is 2⁻⁶⁵ of the logarithm: `z` is at most 0.03.
+    // The rounding error is 2⁻⁶⁵ of the logarithm: `z` is at most 0.03.
     let inner = z.high.mul_add(polynomial(z.high, LN_PAIR_POLYNOMIAL), constant(0.4));
     let outer = DoubleDouble::constant(0.6666666666666666, 3.700743415417188e-17).add_smaller(z.scale(inner));
     s.scale_by_power_of_two(constant(2.0)).add_smaller(s.mul(z.mul(outer)))
@@ -97,7 +97,7 @@ fn ln_1p_pair<D: Double>(a: DoubleDouble<D>) -> DoubleDouble<D> {
     add_exponent(k, ln_1p_reduced(DoubleDouble { high: f.high, low: f.low + a.low * power }))
 }
 
-/// What is not a normal positive number.
+/// Numbers that are not normal and positive.
 #[inline(always)]
 fn is_special<D: Double>(a: D) -> D::Mask {
     D::not(D::and(constant::<D>(f64::MIN_POSITIVE).le(a), a.le(constant(f64::MAX))))
@@ -150,7 +150,7 @@ pub fn log10<D: Double>(a: D) -> D {
     let fraction = ln_1p_reduced_of_double(m - constant(1.0));
     let log =
         fraction.mul(DoubleDouble::constant(core::f64::consts::LOG10_E, 1.098319650216765e-17)).normalise();
-    // The first constant leaves eleven bits for k.
+    // The first constant has eleven zero bits for the product with k.
     let exponent =
         DoubleDouble { high: k * constant(0.30102999566395283), low: k * constant(2.8363394551044964e-14) };
     let mut result = exponent.add_smaller(log).round();
@@ -158,10 +158,10 @@ pub fn log10<D: Double>(a: D) -> D {
     result
 }
 
-/// Beyond this, `√(a² ± 1)` is `a`.
+/// Above this, `√(a² ± 1)` rounds to `a`.
 const LARGE_ARGUMENT: f64 = 1.152921504606847e+18;
 
-/// `ln 2a` for large `a`, else `ln(1 + f)`
+/// `ln 2a` for large `a`, otherwise `ln(1 + f)`.
 #[inline(always)]
 fn ln_2a_or_1p<D: Double>(a: D, f: DoubleDouble<D>) -> D {
     let large = constant::<D>(LARGE_ARGUMENT).lt(a);

@@ -46,13 +46,13 @@ use crate::scalar::{Field, Lanes, Piece, Scalar};
 pub use abreast::{Double, Two};
 use bytemuck::Zeroable;
 
-/// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are
+/// A register of doubles with operations on its bits, for elementary functions. Bit patterns are
 /// written as doubles.
 pub trait DoubleRegister: Lanes {
     /// Whether [`mul_add`](Self::mul_add) rounds once.
     const FUSED: bool;
 
-    /// `self b + c`, in one instruction if there is one, else rounded twice.
+    /// `self b + c`, in one instruction if available, otherwise rounded twice.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// bitwise and
     fn and_bits(self, other: Self) -> Self;
@@ -62,9 +62,9 @@ pub trait DoubleRegister: Lanes {
     fn xor_bits(self, other: Self) -> Self;
     /// The sum of both as 64-bit integers.
     fn add_bits(self, other: Self) -> Self;
-    /// The bits moved up, zeros below.
+    /// Shifts the bits up; zeros enter below.
     fn shift_left<const BITS: i32>(self) -> Self;
-    /// The bits moved down, zeros above.
+    /// Shifts the bits down; zeros enter above.
     fn shift_right<const BITS: i32>(self) -> Self;
     /// The lanes of a mask, one bit each.
     fn bits_of(mask: Self::Mask) -> u32;
@@ -76,12 +76,11 @@ pub trait Single: Lanes {
     type Double: DoubleRegister;
     /// The lower and the upper half.
     fn widen(self) -> [Self::Double; 2];
-    /// The number that has these halves, rounded.
+    /// The register with these halves, rounded.
     fn narrow(low: Self::Double, high: Self::Double) -> Self;
 }
 
-/// The functions of one number that are called for rare lanes, where those of a scalar are the ones
-/// below.
+/// Functions of one number for rare lanes, where those of a scalar are the functions below.
 mod one {
     macro_rules! one {
         ($($name:ident)*) => { $(
@@ -96,13 +95,13 @@ mod one {
     one!(sin cos tan);
 }
 
-/// Replaces the lanes of `result` that are rare by what the function of one number gives.
+/// Replaces the rare lanes of `result` by the value of the function of one number.
 #[inline(always)]
 fn replace_special_lanes<D: Double>(rare: D::Mask, a: D, result: &mut D, f: fn(f64) -> f64) {
     D::replace(rare, [a, a], result, f, |f, a, _| f(a));
 }
 
-/// The same for a function of two numbers.
+/// As [`replace_special_lanes`], for a function of two numbers.
 #[inline(always)]
 fn replace_special_lanes_of_two<D: Double>(
     rare: D::Mask,
@@ -135,8 +134,8 @@ fn each<D: DoubleRegister, F: Copy>(
     *result = D::load(&values);
 }
 
-/// A function, called with what it is applied to. (A trait, because what is called through a value
-/// of type `fn` is not certain to be inlined.)
+/// A function, called with its argument. (A trait, since calls through a value of type `fn` may not
+/// be inlined.)
 pub trait Call<A> {
     /// Its result.
     type Output;
@@ -144,7 +143,7 @@ pub trait Call<A> {
     fn call(argument: A) -> Self::Output;
 }
 
-/// The same of four arguments.
+/// As [`Call`], with four arguments.
 pub trait CallWithFour<A> {
     /// Its result.
     type Output;
@@ -152,7 +151,7 @@ pub trait CallWithFour<A> {
     fn call(a: [A; 4]) -> Self::Output;
 }
 
-/// The same of eight arguments.
+/// As [`Call`], with eight arguments.
 pub trait CallWithEight<A> {
     /// Its result.
     type Output;
@@ -162,9 +161,9 @@ pub trait CallWithEight<A> {
 
 /// An elementary function of `K` numbers with `R` results.
 pub trait Elementary<const K: usize, const R: usize> {
-    /// As the method of a scalar.
+    /// The method of a scalar.
     fn of<S: Scalar>(arguments: [S; K]) -> [S; R];
-    /// In a register of doubles. `#[inline(always)]`
+    /// The implementation for registers of doubles. `#[inline(always)]`
     fn inside<D: Double>(arguments: [D; K]) -> [D; R];
 }
 
@@ -178,15 +177,15 @@ impl<P: Piece> Call<P> for Run {
     }
 }
 
-/// Elementary functions under the names of their methods, with how many arguments and results they
-/// have.
+/// Defines the elementary functions by the names of their methods, with their numbers of arguments
+/// and results.
 macro_rules! calls {
     ($($module:ident::$name:ident[$K:literal, $R:literal]($($argument:ident),*) -> ($($result:ident),*);)*) => { $(
         #[doc = concat!("[`Scalar::", stringify!($name), "`]")]
         #[allow(non_camel_case_types)]
         #[derive(Clone, Copy, Debug)]
         pub struct $name;
-        #[allow(unused_parens)] // One number is no tuple.
+        #[allow(unused_parens)] // A single number is no tuple.
         impl<D: Double> Call<($(one_of!(D $argument)),*)> for $name {
             type Output = ($(one_of!(D $result)),*);
             #[inline(always)]

@@ -1,4 +1,4 @@
-//! A number as a register of one: what machines without registers compute with.
+//! A number as a register of one, for machines without registers.
 
 use super::DoubleRegister;
 

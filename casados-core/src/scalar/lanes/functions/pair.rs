@@ -31,14 +31,14 @@ pub fn exact_sum<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     DoubleDouble { high, low }
 }
 
-/// `a + b`, exactly where `a = 0` or `|a| ≥ |b|`.
+/// `a + b`, exact if `a = 0` or `|a| ≥ |b|`.
 #[inline(always)]
 pub fn exact_ordered_sum<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     let [high, low] = fast_two_sum(a, b);
     DoubleDouble { high, low }
 }
 
-/// `a b`, exactly as long as nothing overflows or underflows.
+/// `a b`, exact without overflow or underflow.
 #[inline(always)]
 pub fn exact_product<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     let high = a * b;
@@ -63,7 +63,7 @@ impl<D: Double> DoubleDouble<D> {
     pub fn new(a: D) -> Self {
         Self { high: a, low: constant(0.0) }
     }
-    /// A constant and what it lacks.
+    /// A constant and its rounding error.
     #[inline(always)]
     pub fn constant(high: f64, low: f64) -> Self {
         Self { high: constant(high), low: constant(low) }
@@ -73,17 +73,17 @@ impl<D: Double> DoubleDouble<D> {
     pub fn select(mask: D::Mask, a: Self, b: Self) -> Self {
         Self { high: D::select(mask, a.high, b.high), low: D::select(mask, a.low, b.low) }
     }
-    /// Rounded.
+    /// Rounds to a double.
     #[inline(always)]
     pub fn round(self) -> D {
         self.high + self.low
     }
-    /// The same number with the least `low`.
+    /// The same number with the smallest `low`.
     #[inline(always)]
     pub fn normalise(self) -> Self {
         exact_ordered_sum(self.high, self.low)
     }
-    /// Another sign.
+    /// The negative number.
     #[inline(always)]
     pub fn negate(self) -> Self {
         Self { high: -self.high, low: -self.low }
@@ -94,7 +94,7 @@ impl<D: Double> DoubleDouble<D> {
         let s = exact_sum(self.high, other.high);
         Self { high: s.high, low: s.low + (self.low + other.low) }.normalise()
     }
-    /// The sum, where `self` is zero or the larger one.
+    /// The sum; `self` is zero or has the larger magnitude.
     #[inline(always)]
     pub fn add_smaller(self, other: Self) -> Self {
         let s = exact_ordered_sum(self.high, other.high);
@@ -112,7 +112,7 @@ impl<D: Double> DoubleDouble<D> {
         let p = exact_product(self.high, factor);
         Self { high: p.high, low: self.low.mul_add(factor, p.low) }
     }
-    /// The product with a power of two, or with ½ or such.
+    /// The product with a power of two, including ½.
     #[inline(always)]
     pub fn scale_by_power_of_two(self, power: D) -> Self {
         Self { high: self.high * power, low: self.low * power }
@@ -131,11 +131,11 @@ impl<D: Double> DoubleDouble<D> {
     /// The quotient.
     #[inline(always)]
     pub fn div(self, other: Self) -> Self {
-        // One division: the quotient may be off by two units, of which the rest knows.
+        // One division: the quotient may be wrong by two units, which the rest corrects.
         let reciprocal = constant::<D>(1.0) / other.high;
         let quotient = self.high * reciprocal;
         let rest = if D::FUSED {
-            // The first product leaves less than a double has digits for.
+            // The remainder of the first product fits a double.
             let rest = (-quotient).mul_add(other.high, self.high);
             (-quotient).mul_add(other.low, rest + self.low)
         } else {
@@ -155,7 +155,7 @@ impl<D: Double> DoubleDouble<D> {
     }
 }
 
-/// `c[0] + c[1] x + ..`, the even and the odd powers side by side.
+/// `c[0] + c[1] x + ..`, with the even and odd powers interleaved.
 #[inline(always)]
 pub fn polynomial<D: Double, const K: usize>(x: D, coefficients: [f64; K]) -> D {
     let square = x * x;

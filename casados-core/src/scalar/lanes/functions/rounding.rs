@@ -3,8 +3,8 @@
 use super::Double;
 use super::pair::constant;
 
-/// `1.5 · 2⁵²`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
-/// last bits.
+/// `1.5 · 2⁵²`: adding and subtracting it rounds to an integer; adding it alone leaves the integer
+/// in the last bits.
 pub const ROUNDING_SHIFT: f64 = 6_755_399_441_055_744.0;
 /// The first 42 bits of ln 2, and the next 53.
 pub const LN_2_PARTS: [f64; 2] = [0.6931471805598903, 5.497923018708371e-14];
@@ -21,7 +21,7 @@ pub fn round_to_integer<D: Double>(a: D) -> D {
     (a + constant(ROUNDING_SHIFT)) - constant(ROUNDING_SHIFT)
 }
 
-/// `a` between bounds; NaN stays.
+/// Clamps `a` to the bounds; NaN is returned.
 #[inline(always)]
 pub fn clamp<D: Double>(a: D, low: f64, high: f64) -> D {
     let a = D::select(constant::<D>(high).lt(a), constant(high), a);

@@ -1,7 +1,8 @@
 //! Sine, cosine, tangent and their inverses.
 //!
-//! `a = n π/2 + r` with `|r| ≤ π/4` by constants of 152 bits (Cody and Waite); larger arguments go
-//! through the function of one number. Minimax polynomials, whose leading terms are added as pairs.
+//! `a = n π/2 + r` with `|r| ≤ π/4` by constants of 152 bits (Cody and Waite); larger arguments use
+//! the function of one number. Minimax polynomials, whose leading terms are added in double-double
+//! arithmetic.
 
 use super::pair::{
     DoubleDouble, bit_pattern, constant, exact_ordered_sum, exact_product, exact_sum, polynomial,
@@ -47,7 +48,7 @@ fn reduce_modulo_pi_2<D: Double>(a: D) -> (D, DoubleDouble<D>) {
     let shifted = a * constant(FRAC_2_PI) + constant(ROUNDING_SHIFT);
     let n = shifted - constant(ROUNDING_SHIFT);
     if D::FUSED {
-        // The first product is rounded only after the cancellation, which is exact.
+        // The first product is rounded after the cancellation, which is exact.
         let first = a.subtract_product(n, constant(PI_2_DOUBLES[0]));
         let second = exact_product(n, constant(PI_2_DOUBLES[1]));
         let r = exact_sum(first, -second.high);
@@ -85,7 +86,7 @@ fn quadrant<D: Double>(shifted: D) -> (D::Mask, D) {
     (D::not(last.eq(constant(1.0))), sign)
 }
 
-/// Arguments that the reduction does not take, and zeros in their place.
+/// The mask of arguments too large for the reduction, and the arguments with zeros in their place.
 #[inline(always)]
 fn without_large_arguments<D: Double>(a: D) -> (D::Mask, D) {
     let usual = a.abs().lt(constant(MAX_REDUCED_ARGUMENT));
@@ -142,7 +143,7 @@ pub fn tan<D: Double>(a: D) -> D {
     let (s, co) = (s.normalise(), co.normalise());
     let (odd, _) = quadrant(shifted);
     let quotient = DoubleDouble::select(odd, co, s).div(DoubleDouble::select(odd, s.negate(), co)).round();
-    // So small a number is its own tangent, and its products would underflow.
+    // A number this small equals its tangent, and its products would underflow.
     let result = D::select(magnitude.lt(constant(1e-9)), magnitude, quotient);
     let mut result = result.xor_bits(a.and_bits(constant(-0.0)));
     replace_special_lanes(rare, a, &mut result, one::tan);
@@ -165,16 +166,16 @@ const ATAN_POLYNOMIAL: [f64; 12] = [
     0.015485553133661487,
 ];
 const TAN_PI_8: f64 = 0.41421356237309503;
-/// What π/4 lacks as a double.
+/// π/4 minus its double.
 const PI_4_LOW: f64 = 3.061616997868383e-17;
 
-/// The angle of the point `(x, y)`, neither negative nor both zero; `x_is_negative` where the point
-/// is to be mirrored.
+/// The angle of the point `(x, y)`, whose coordinates are not negative and not both zero; mirrored
+/// where `x_is_negative`.
 #[inline(always)]
 fn angle<D: Double>(y: DoubleDouble<D>, x: DoubleDouble<D>, x_is_negative: D::Mask) -> D {
     let steep = x.high.lt(y.high);
     let (long, short) = (DoubleDouble::select(steep, y, x), DoubleDouble::select(steep, x, y));
-    // Beyond π/8 the angle from the diagonal: tan(φ − π/4) = (tan φ − 1)/(tan φ + 1).
+    // Beyond π/8 the angle relative to the diagonal: tan(φ − π/4) = (tan φ − 1)/(tan φ + 1).
     let diagonal = (long.high * constant(TAN_PI_8)).lt(short.high);
     let zero = constant(0.0);
     let numerator = DoubleDouble::select(diagonal, short.add(long.negate()), short);

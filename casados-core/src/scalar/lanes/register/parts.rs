@@ -1,4 +1,4 @@
-//! Parts of the types: what is written out in each of them.
+//! Macros that implement parts of the register types.
 
 macro_rules! operators {
     ($name:ident, $ops:ident: $($trait:ident $method:ident $function:ident),*) => { $(
@@ -12,7 +12,7 @@ macro_rules! operators {
     )* };
 }
 
-/// A register with all its lanes, for functions that are the same whatever part of it is used.
+/// The whole register, for functions that are independent of the used lanes.
 macro_rules! whole {
     ($name:ident, $ops:ident, $a:expr) => {
         $name::<{ $ops::WIDTH }>($a.0)
@@ -79,7 +79,7 @@ macro_rules! of_singles {
     };
 }
 
-/// Eight `f64`, whose demotedd numbers take half a register.
+/// Eight `f64`, whose demoted numbers take half a register.
 #[cfg(target_arch = "x86_64")]
 macro_rules! in_half_a_register {
     () => {
@@ -153,12 +153,12 @@ macro_rules! single {
     };
 }
 
-/// Complex numbers, real parts in the lower half of a register and imaginary ones in the upper.
+/// Complex numbers: real parts in the lower half of a register, imaginary ones in the upper half.
 #[cfg(target_arch = "x86_64")]
 macro_rules! complex {
     ($name:ident, $element:ident, $ops:ident) => {
         impl $name<{ $ops::WIDTH }> {
-            /// `target − a b` of the numbers at the beginning of arrays, half as many as the
+            /// `target − a b` of the numbers at the start of the arrays, half as many as the
             /// register has elements.
             #[inline(always)]
             pub fn subtract_complex<const N: usize>(
@@ -172,12 +172,12 @@ macro_rules! complex {
                     return;
                 };
                 let numbers = Self::load(b);
-                // `i b`: what several products have in common is made once.
+                // `i b`, shared by several products.
                 let turned = Self($ops::xor($ops::swap_halves(numbers.0), $ops::signs_below()));
                 let difference = Self::load(target).subtract_product(Self::twice(a, 0), numbers);
                 difference.subtract_product(Self::twice(a, $ops::WIDTH / 2), turned).store(target);
             }
-            /// Half of the elements, in both halves.
+            /// A copy of half of the elements in both halves.
             #[inline(always)]
             fn twice(elements: &[$element; $ops::WIDTH], begin: usize) -> Self {
                 let mut all = [0.0; $ops::WIDTH];
@@ -196,7 +196,7 @@ macro_rules! complex {
 macro_rules! slices {
     ($name:ident, $element:ident, $ops:ident) => {
         impl $name<{ $ops::WIDTH }> {
-            /// `target − a b`, element by element, as far as all go.
+            /// `target − a b`, element by element, for the shortest of the lengths.
             #[inline(always)]
             pub fn subtract_each(target: &mut [$element], a: &[$element], b: &[$element]) {
                 let length = target.len().min(a.len()).min(b.len());
@@ -213,18 +213,18 @@ macro_rules! slices {
     };
 }
 
-/// What blocks of four stages are multiplied with.
+/// Factors of blocks of four stages.
 #[cfg(target_arch = "x86_64")]
 macro_rules! fours {
     ($name:ident, $element:ident, $ops:ident) => {
         impl $name<{ $ops::WIDTH }> {
-            /// The same four numbers again and again.
+            /// The same four numbers, repeated.
             #[inline(always)]
             pub fn repeat_four(numbers: &[$element; 4]) -> Self {
                 Self($ops::repeat_four(numbers))
             }
-            /// Of each four numbers the first in all four places, the second, the third, the
-            /// fourth.
+            /// For each group of four numbers the first one in all four places, the second, the
+            /// third, and the fourth.
             #[inline(always)]
             pub fn each_of_four(self) -> [Self; 4] {
                 let [a, b, c, d] = $ops::each_of_four(self.0);

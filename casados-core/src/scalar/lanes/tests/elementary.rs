@@ -1,4 +1,4 @@
-//! Elementary functions of registers against references of 100 bits, and where they are special.
+//! Elementary functions of registers against references of 100 bits, and at special arguments.
 
 use super::reference::{self, ReferenceFunction};
 use super::{cell, inside, on_every_register, same, specials};
@@ -16,7 +16,7 @@ impl Random {
         self.0 ^= self.0 << 17;
         self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
     }
-    /// between two bounds
+    /// A number between two bounds.
     fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -27,8 +27,8 @@ impl Random {
     }
 }
 
-/// An elementary function: its name, on registers, its reference, where it is tried, and the bound
-/// of its error (units in the last place) that is documented.
+/// An elementary function: its name, its implementation for registers, its reference, its test
+/// arguments, and the documented bound of its error (units in the last place).
 struct Case<L> {
     name: &'static str,
     of_lanes: fn(L, L) -> L,
@@ -38,7 +38,7 @@ struct Case<L> {
     bound: f64,
 }
 
-/// Not too large for the reduction, often close to a multiple of π/2.
+/// An angle within the range of the reduction, often close to a multiple of π/2.
 fn angle(random: &mut Random) -> (f64, f64) {
     let a = match random.bits() % 4 {
         0 => random.magnitude(-300.0, 6.2),
@@ -123,14 +123,14 @@ fn scaled(a: f64, n: i32) -> f64 {
     a * 2.0_f64.powi(n / 2) * 2.0_f64.powi(n - n / 2)
 }
 
-/// The error of a result in units in the last place of the exact one, for a type of so many bits.
+/// The error of a result in units in the last place of the exact one, for a type with `bits` bits.
 fn error(result: f64, (exact, n): (reference::DoubleDouble, i32), bits: i32) -> f64 {
     let unit = 2.0_f64.powi(exact.high.abs().log2().floor() as i32 + 1 - bits);
     (scaled(result, -n) - exact.high - exact.low).abs() / unit
 }
 
-/// Errors stay below the bounds for `f64`; `f32` is rounded from them: half a unit, and what an
-/// error of one unit of `f64` may add to that.
+/// Errors are below the bounds for `f64`; for `f32`, which is rounded from it, below half a unit
+/// plus the contribution of one unit of `f64`.
 fn accuracy<L: Lanes>(bits: i32) {
     let count = if cfg!(debug_assertions) { 1000 } else { 50_000 };
     for case in cases::<L>() {
@@ -153,7 +153,7 @@ fn accuracy<L: Lanes>(bits: i32) {
                     let limits = if single {
                         f64::from(f32::MIN_POSITIVE)..f64::from(f32::MAX)
                     } else {
-                        // Beyond, the reference has no digits left to lose.
+                        // Beyond, the reference lacks digits.
                         1e-290..1e307
                     };
                     if ![a, one].iter().all(|a| limits.contains(&a.abs())) || b.abs() > limits.end {
@@ -193,7 +193,7 @@ fn errors_are_below_the_documented_bounds() {
     on_every_register!(check);
 }
 
-/// A number as a register of one, which is what firmware computes with, has the same bounds.
+/// A number as a register of one, used by firmware, has the same bounds.
 #[test]
 fn numbers_as_registers_of_one() {
     let count = if cfg!(debug_assertions) { 4000 } else { 200_000 };
@@ -222,12 +222,14 @@ fn numbers_as_registers_of_one() {
     }
 }
 
-/// Zeros keep their sign, infinities and NaN are where they are for one number, and all else is
-/// finite and close to what `f64` gives. How close, the other test says; here are all magnitudes.
+/// Zeros keep their sign, infinities and NaN are as for single numbers, and all other results are
+/// finite and close to `f64`, for arguments of all magnitudes. The test of accuracy bounds the
+/// errors.
 fn special<L: Lanes>() {
     let values = specials();
     for case in cases::<L>() {
-        // The standard library loses all digits of these at both ends of the range, and overflows.
+        // The standard library loses all digits of these functions at both ends of the range, and
+        // overflows.
         let poor = matches!(case.name, "asinh" | "acosh" | "atanh");
         inside::<L>(|| {
             let seconds = if matches!(case.name, "atan2" | "hypot" | "powf") { values.len() } else { 1 };
@@ -264,7 +266,7 @@ fn special_arguments_are_as_for_one_number() {
     on_every_register!(check);
 }
 
-/// Whatever is in one lane, the others have the same bits.
+/// The bits of a lane are independent of the other lanes.
 fn independence<L: Lanes>() {
     let strange = [f64::NAN, f64::INFINITY, -0.0, 1e300, -3.0, 5e-324, f64::NEG_INFINITY];
     for case in cases::<L>() {
@@ -319,8 +321,8 @@ fn sin_cos_equals_sin_and_cos() {
     on_every_register!(check);
 }
 
-/// Several arguments at once have the values that one after the other has. It is compiled hundreds
-/// of times: in loops, and what does not depend on the function is outside of it.
+/// Several arguments in one call give the values of separate calls. Compiled hundreds of times:
+/// therefore with loops, and independent parts outside.
 fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize, const N: usize>(_: F) {
     let values = specials();
     inside::<L>(|| {
@@ -359,9 +361,9 @@ fn assert_same_lanes<L: Lanes>(found: L, expected: L, argument: L) {
     }
 }
 
-/// All functions in one register; in the others, whose arguments are packed differently, one with
-/// an argument and a result, one with two of each. Registers are those that are all used, of four
-/// doubles such as have room for two in one as well, and one of each with a lane that is not used.
+/// All functions in one register type; in the others, whose arguments are packed differently, one
+/// function with one argument and result, and one with two of each. The register types: all lanes
+/// used, doubles in wider registers, and each with an unused lane.
 #[test]
 fn several_arguments_in_one_call() {
     macro_rules! all {

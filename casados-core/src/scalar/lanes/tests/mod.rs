@@ -1,4 +1,4 @@
-//! Registers against single numbers, lane by lane, on all kinds of registers that the machine has.
+//! Registers against single numbers, lane by lane, for all kinds of registers of the machine.
 
 mod elementary;
 mod products;
@@ -8,7 +8,7 @@ use super::*;
 use crate::scalar::{Lanes, Piece, Scalar, Strided};
 use std::vec::Vec;
 
-/// Numbers in which something is special, and their neighbours.
+/// Special numbers and their neighbours.
 fn specials() -> Vec<f64> {
     let mut values = std::vec![0.0, f64::INFINITY, f64::NAN];
     for magnitude in
@@ -21,7 +21,7 @@ fn specials() -> Vec<f64> {
     values.iter().flat_map(|&value| [value, -value]).collect()
 }
 
-/// Runs a closure where the instructions of `L` may be used.
+/// Runs a closure with the instructions of `L` enabled.
 struct Inside<F>(F);
 impl<F: FnMut()> Piece for Inside<F> {
     #[inline(always)]
@@ -33,7 +33,7 @@ fn inside<L: Scalar>(f: impl FnMut()) {
     L::vectorize(Inside(f));
 }
 
-/// Equal bits, or both NaN.
+/// Whether the bits are equal, or both are NaN.
 fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
 }
@@ -47,7 +47,7 @@ fn cell<L: Lanes>(values: &[f64], start: usize, stride: usize) -> L::Cell {
     cell
 }
 
-/// Arithmetic of registers gives the bits that arithmetic of `S`, one lane, gives.
+/// Arithmetic of registers is bitwise equal to arithmetic of `S`, one lane.
 fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
     let values = specials();
     inside::<L>(|| {
@@ -114,7 +114,7 @@ fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
     });
 }
 
-/// `c − a b`, rounded once where the machine can.
+/// `c − a b`, rounded once if the machine supports it.
 fn check_fused_products<L: Lanes>(fused: bool) {
     inside::<L>(|| {
         let a = 1.0 + f64::EPSILON;
@@ -126,9 +126,9 @@ fn check_fused_products<L: Lanes>(fused: bool) {
     });
 }
 
-/// Quotients by constants have the bits of divisions, whatever they are made of.
+/// Quotients by constants are bitwise equal to divisions, however they are computed.
 fn quotients<L: Lanes>() {
-    // `c`, and `1/c` as a sum that the macro has found to give them.
+    // `c`, and `1/c` as the sum that the macro has verified.
     let constants = [
         (3.0, [0.3333333333333333, 1.850371707708594e-17]),
         (-100.0, [-0.009999999999999998, -1.5265566588595903e-18]),
@@ -145,7 +145,7 @@ fn quotients<L: Lanes>() {
                 (L::load(&cell) / L::from_f64(c)).store(&mut expected);
                 for lane in 0..L::LANES {
                     let [a, found, expected] = [&cell, &found, &expected].map(|cell| L::lane(cell, lane));
-                    // Below the normal numbers of `h x` or `l x` there are fewer digits.
+                    // Where `h x` or `l x` is subnormal, digits are lost.
                     let tiny = a.abs() < 1e-290 && (found - expected).abs() <= 5e-324;
                     assert!(same(found, expected) || tiny, "{a:e} / {c}: {found:e}, not {expected:e}");
                 }
@@ -154,7 +154,7 @@ fn quotients<L: Lanes>() {
     });
 }
 
-/// Demoted numbers are the same with fewer digits, or with all.
+/// Demotion keeps the numbers, with fewer digits or with all.
 fn demote<L: Lanes>() {
     let values = specials();
     inside::<L>(|| {
@@ -172,7 +172,7 @@ fn demote<L: Lanes>() {
     });
 }
 
-/// Numbers of each lane beside each other are the same numbers, of any number of registers.
+/// Transposition keeps the numbers, for any number of registers.
 fn transposed<L: Lanes>() {
     inside::<L>(|| {
         let number = |register: usize, lane: usize| (10 * register + lane) as f64;
@@ -199,7 +199,7 @@ fn transposed<L: Lanes>() {
     });
 }
 
-/// Checks each kind of register that the machine has, with the numbers of lanes that are listed.
+/// Tests each kind of register of the machine, with the listed numbers of lanes.
 macro_rules! on_every_register {
     ($check:ident) => {
         if is_detected(Level::Base) {

@@ -1,20 +1,19 @@
-//! Products of numbers side by side have the bits that one number after the other gives, in
-//! registers of any width.
+//! Products in registers of any width are bitwise equal to those of single numbers.
 
 #[cfg(target_arch = "x86_64")]
 use super::{super::*, inside};
 use crate::scalar::{Known, Real};
 use core::array::from_fn;
 
-/// Numbers of all signs and several magnitudes, the same ones every time.
+/// Pseudo-random numbers of both signs and several magnitudes.
 fn random_number<T: Real>(seed: &mut u64) -> T {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let fraction = (*seed >> 33) as f64 / (1u64 << 31) as f64 - 0.5;
     T::from_f64(fraction * [1e-3, 1.0, 30.0][(*seed >> 20) as usize % 3])
 }
 
-/// `target − left right` and `target = left`, of blocks that lie column after column, of columns,
-/// of rows, element by element.
+/// `target − left right` and `target = left` for blocks in column-major order, columns, rows, and
+/// element by element.
 fn blocks<T: Real, const S: usize, const WIDE: bool>() {
     let seed = &mut (S as u64);
     let [target, left, right]: [[[T; S]; S]; 3] = from_fn(|_| from_fn(|_| from_fn(|_| random_number(seed))));

@@ -1,5 +1,5 @@
-//! Elementary functions to about 100 bits: Taylor series in pairs of doubles, and Newton's method
-//! for inverses. Slow and plain; nothing is shared with what they are the reference of.
+//! Elementary functions to about 100 bits: Taylor series in double-double arithmetic, and Newton's
+//! method for inverses. Slow and simple, independent of the tested code.
 
 use core::f64::consts::LN_2;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -11,7 +11,8 @@ pub struct DoubleDouble {
     pub low: f64,
 }
 
-/// π/2 and ln 2 to 159 bits. Digits: OEIS A019669, A002162; cut by hand with 200 bits of `mpmath`.
+/// π/2 and ln 2 to 159 bits. Digits: OEIS A019669, A002162; truncated by hand with 200 bits of
+/// `mpmath`.
 const PI_2: [f64; 3] = [core::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33];
 const LN_2_PARTS: [f64; 3] = [LN_2, 2.3190468138462996e-17, 5.707708438416212e-34];
 /// ln 10 to 106 bits, OEIS A002392
@@ -32,7 +33,8 @@ fn two_product(a: f64, b: f64) -> DoubleDouble {
     DoubleDouble { high, low: a.mul_add(b, -high) }
 }
 
-/// The sum of a few numbers, however they cancel: what every addition loses is added again.
+/// The compensated sum of a few numbers with any cancellation: rounding errors are added
+/// repeatedly.
 fn accurate_sum<const K: usize>(mut terms: [f64; K]) -> DoubleDouble {
     for _ in 0..K {
         for i in 1..K {
@@ -84,7 +86,7 @@ impl Div for DoubleDouble {
 
 impl DoubleDouble {
     fn times_two_to_the(self, n: i32) -> Self {
-        // In two steps: 2¹⁰²⁴ is no double.
+        // In two factors: 2¹⁰²⁴ is no double.
         let (half, rest) = (2.0_f64.powi(n / 2), 2.0_f64.powi(n - n / 2));
         Self { high: self.high * half * rest, low: self.low * half * rest }
     }
@@ -100,7 +102,7 @@ impl DoubleDouble {
     }
 }
 
-/// `eᵃ − 1` for `|a| ≤ 1`: Taylor's series of a 512th, and `(1 + e)² − 1 = 2e + e²`.
+/// `eᵃ − 1` for `|a| ≤ 1`: Taylor series of a 512th, and `(1 + e)² − 1 = 2e + e²`.
 fn exp_m1_small(a: DoubleDouble) -> DoubleDouble {
     let r = a.times_two_to_the(-9);
     let mut e = double_double(0.0);
@@ -129,7 +131,7 @@ fn exp_m1_long(a: DoubleDouble) -> DoubleDouble {
     (double_double(1.0) + e).times_two_to_the(n) - double_double(1.0)
 }
 
-/// `ln(1 + f)`: one step of Halley's method from what `f64` gives.
+/// `ln(1 + f)`: one step of Halley's method from the value of `f64`.
 fn ln_1p_long(f: DoubleDouble) -> DoubleDouble {
     if f.high > 1e9 {
         return ln_long(double_double(1.0) + f);
@@ -171,7 +173,7 @@ fn sin_cos_long(a: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
     }
 }
 
-/// The angle of `(x, y)`: what `f64` gives, and the small angle that is left.
+/// The angle of `(x, y)`: the value of `f64` plus the small remaining angle.
 fn angle(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble {
     let start = f64::atan2(y.high, x.high);
     let (sin, cos) = sin_cos_long(double_double(start));
@@ -179,13 +181,13 @@ fn angle(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble {
     double_double(start) + (rest - rest * rest.square() / double_double(3.0))
 }
 
-/// A function of two numbers (of which most use one): `(value, n)` for the result `value · 2ⁿ`.
+/// A function of two numbers (most ignore the second): `(value, n)` for the result `value · 2ⁿ`.
 pub type ReferenceFunction = fn(f64, f64) -> (DoubleDouble, i32);
 
 fn half_exponential_sum(a: f64, sign: f64) -> (DoubleDouble, i32) {
     let (e, n) = exp_with_exponent(double_double(a.abs()));
     let rising = double_double(1.0) + e;
-    // Of |a| > 40, the falling exponential is less than the last bit.
+    // For |a| > 40 the decaying exponential is below the last bit.
     let falling =
         if n < 60 { (double_double(1.0) / rising).times_two_to_the(-2 * n) } else { double_double(0.0) };
     (rising + falling * double_double(sign), n - 1)

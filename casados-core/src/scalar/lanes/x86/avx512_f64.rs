@@ -28,8 +28,7 @@ wrap! {
 define! {
     transpose(rows: [Register; 8]) -> [Register; 8] {{
         let [a, b, c, d, e, f, g, h] = rows;
-        // Pairs of rows; of two of these the quarters that are even and those that are odd,
-        // twice.
+        // Pairs of rows; then the even and the odd quarters of two pairs, twice.
         let even = [
             _mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h),
         ];
@@ -49,11 +48,11 @@ define! {
         let (abcd, efgh) = (add_quarters(ab, cd), add_quarters(ef, gh));
         add_quarters(abcd, efgh)
     }}
-    /// The sums of two neighbouring quarters, of the first register and of the second.
+    /// The sums of adjacent quarters, of the first register, then of the second.
     add_quarters(a: Register, b: Register) -> Register {
         _mm512_add_pd(_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b))
     }
-    /// The first quarters of all, the second, the third, the fourth.
+    /// All first quarters, all second, third, and fourth ones.
     quarters(rows: [Register; 4]) -> [Register; 4] {{
         let [a, b, c, d] = rows;
         let (even, odd) = (

@@ -1,4 +1,4 @@
-//! What adapters do for one element.
+//! Adapters for a single element.
 
 use super::ends::IteratorEnd;
 use super::{Iter, holds, into_iter, option_content};
@@ -7,7 +7,7 @@ use crate::language::place::Place;
 use crate::language::value::Value;
 use syn::Result;
 
-/// Reads an iterator in a variable, and writes back what is left of it.
+/// Advances an iterator in a variable, and writes the rest back.
 pub fn by_ref(
     place: &Place,
     end: IteratorEnd,
@@ -22,7 +22,7 @@ pub fn by_ref(
     Ok(value)
 }
 
-/// `iter::successors`: the value that was made last, for which the one after it is made.
+/// `iter::successors`: returns the current value and computes its successor.
 pub fn successor(
     now: &mut Option<Box<Value>>,
     closure: &Value,
@@ -144,7 +144,7 @@ pub fn map_while(
     Ok(value)
 }
 
-/// `scan`: the state is lent to the closure.
+/// `scan`: the closure borrows the state.
 pub fn scan(
     state: &mut Value,
     closure: &Value,
@@ -199,7 +199,7 @@ pub fn last_of_steps(
     at: TokenSpan,
 ) -> Result<Option<Value>> {
     let length = inner.length(evaluator, at)?;
-    // The elements that come are those at `first`, `first + step`, ..
+    // The elements are those at `first`, `first + step`, ..
     let first = if begun { step - 1 } else { 0 };
     if length <= first {
         return Ok(None);
@@ -225,7 +225,7 @@ pub fn chain(
     second.next(evaluator, at)
 }
 
-/// The last pair: what one of them has more than the other is left out.
+/// The last pair: surplus elements of the longer one are dropped.
 pub fn last_of_both(
     a: &mut Iter,
     b: &mut Iter,
@@ -245,8 +245,8 @@ pub fn last_of_both(
     })
 }
 
-/// An element of the elements: of the one that is open at this end, of the next ones, of the one
-/// that is open at the other end.
+/// An element of nested iterators: from the open one at this end, from the next ones, or from the
+/// open one at the other end.
 pub fn flatten(
     inner: &mut Iter,
     [near, far]: [&mut Option<Box<Iter>>; 2],

@@ -1,4 +1,4 @@
-//! Pulling an element from the front or from the back.
+//! Elements from the front or from the back.
 
 use super::{Iter, adapters, option_content};
 use crate::language::evaluator::{Evaluator, TokenSpan, error};
@@ -6,7 +6,7 @@ use crate::language::place::Projection;
 use crate::language::value::{Integer, Value};
 use syn::Result;
 
-/// Where an element is pulled.
+/// The end at which an element is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum IteratorEnd {
     Front,
@@ -14,7 +14,7 @@ pub(super) enum IteratorEnd {
 }
 
 impl Iter {
-    /// The next element from one of both ends.
+    /// The next element from one of the ends.
     pub(super) fn pull(
         &mut self,
         end: IteratorEnd,
@@ -129,7 +129,7 @@ impl Iter {
             Iter::FilterMap(inner, closure) => adapters::filter_map(inner, closure, BACK, evaluator, at)?,
             Iter::Rev(inner) => inner.next(evaluator, at)?,
             Iter::Take(inner, left) => {
-                // All values of `repeat` are the last one.
+                // All values of `repeat` equal its last one.
                 let endless = matches!(**inner, Iter::Repeat(_));
                 let length = if endless { *left } else { inner.length(evaluator, at)? };
                 for _ in *left..length {

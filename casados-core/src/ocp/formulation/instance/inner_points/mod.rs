@@ -1,12 +1,12 @@
-//! Points inside of intervals, at which path constraints and bounds of states hold too, and bounds
-//! of algebraic states.
+//! Points inside intervals, at which path constraints and bounds of states and algebraic states
+//! hold too.
 //!
 //! ```text
 //! rows of a stage   (g at its node, links of copies, g at every point, bounds of variables at points)
 //! ```
 //!
 //! An interval is integrated from point to point, so that states there are exact ends of steps. The
-//! rows are behind those that a problem has in any case: it costs nothing where there are none.
+//! rows of the points follow the other rows of a problem: problems without points have no cost.
 
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod piece_memory;
@@ -28,24 +28,25 @@ use crate::shape::Shape;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-/// What a row behind the path constraints at nodes is.
+/// A row that follows the path constraints at the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::ocp) enum InnerRow {
-    /// A row of the path constraints at a point, from 1 on.
+    /// A row of the path constraints at a point, counted from 1.
     Path { row: usize, point: usize },
-    /// A state, or behind all of these an algebraic one, at a point; 0 is the node.
+    /// The bounds of a state or, by indices from `NX` on, of an algebraic state at a point; point 0
+    /// is the node.
     Variable { variable: usize, point: usize },
 }
 
 impl InnerRow {
-    /// Which of the points.
+    /// Returns the point of the row.
     pub fn point(self) -> usize {
         match self {
             Self::Path { point, .. } | Self::Variable { point, .. } => point,
         }
     }
 
-    /// What kind of bounds it has.
+    /// Returns the kind of bounds of the row.
     pub fn bounds_part<P: Formulation<T>, T: Real>(self) -> Part {
         match self {
             Self::Path { .. } => Part::PathBounds,
@@ -55,18 +56,18 @@ impl InnerRow {
     }
 }
 
-/// The points of every interval, and what has rows there.
+/// The points of every interval, and the variables with bounds there.
 #[derive(Clone, Debug)]
 pub(in crate::ocp) struct InnerPoints<T> {
-    /// The points as parts of an interval, between zero and one; empty if there are none.
+    /// Zero, the points as fractions of an interval, and one; empty if there are no points.
     #[cfg(feature = "alloc")]
     fractions: Vec<T>,
-    /// Variables that have bounds, each with the point.
+    /// Bounded variables, each with its point.
     #[cfg(feature = "alloc")]
     bounded_variables: Vec<(usize, usize)>,
     #[cfg(feature = "alloc")]
     pub piece_memory: PieceMemory<T>,
-    /// Whether costs are at points too.
+    /// Whether costs are evaluated at points too.
     #[cfg(feature = "alloc")]
     has_costs_at_points: bool,
     number_type: PhantomData<T>,
@@ -89,13 +90,13 @@ impl<T> Default for InnerPoints<T> {
 }
 
 impl<T: Real> InnerPoints<T> {
-    /// How many points there are.
+    /// Returns the number of points.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.fractions().len().saturating_sub(2)
     }
 
-    /// Zero, the points, and one; nothing if there are no points.
+    /// Returns zero, the points, and one; nothing if there are no points.
     #[inline(always)]
     pub fn fractions(&self) -> &[T] {
         #[cfg(feature = "alloc")]
@@ -104,7 +105,7 @@ impl<T: Real> InnerPoints<T> {
         &[]
     }
 
-    /// Whether costs are at points too.
+    /// Returns whether costs are evaluated at points too.
     #[inline(always)]
     pub fn has_costs_at_points(&self) -> bool {
         #[cfg(feature = "alloc")]
@@ -113,13 +114,13 @@ impl<T: Real> InnerPoints<T> {
         false
     }
 
-    /// Which part of an interval its node stands for in a running cost.
+    /// Returns the fraction of an interval that its node represents in a running cost.
     #[inline(always)]
     pub fn node_fraction(&self) -> T {
         if self.has_costs_at_points() { self.fraction(1) } else { T::ONE }
     }
 
-    /// Bounded variables, each with its point.
+    /// Returns the bounded variables, each with its point.
     #[inline(always)]
     pub fn bounded_variables(&self) -> &[(usize, usize)] {
         #[cfg(feature = "alloc")]
@@ -128,13 +129,13 @@ impl<T: Real> InnerPoints<T> {
         &[]
     }
 
-    /// How many rows there are at a stage.
+    /// Returns the number of rows at a stage.
     #[inline(always)]
     pub fn row_count<P: Formulation<T>>(&self) -> usize {
         self.count() * P::Path::ROWS + self.bounded_variables().len()
     }
 
-    /// What a row is.
+    /// Returns a row by its index.
     pub fn row<P: Formulation<T>>(&self, index: usize) -> Option<InnerRow> {
         let path_row_count = self.count() * P::Path::ROWS;
         match index.checked_sub(path_row_count) {
@@ -146,7 +147,7 @@ impl<T: Real> InnerPoints<T> {
         }
     }
 
-    /// A row, and what it is called.
+    /// Returns a row and its name.
     pub fn row_name<P: Formulation<T>>(&self, row: usize) -> (InnerRow, (&'static str, usize)) {
         let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
         let row = self.row::<P>(row).unwrap_or(InnerRow::Variable { variable: 0, point: 0 });
@@ -159,13 +160,13 @@ impl<T: Real> InnerPoints<T> {
         (row, name)
     }
 
-    /// Whether algebraic states have bounds at nodes.
+    /// Returns whether algebraic states have bounds at nodes.
     #[inline(always)]
     pub fn has_algebraic_bounds<P: Formulation<T>>(&self) -> bool {
         self.bounded_variables().iter().any(|&(variable, point)| point == 0 && variable >= P::Shape::NX)
     }
 
-    /// The part of the interval that a point is.
+    /// Returns a point as a fraction of the interval.
     pub fn fraction(&self, point: usize) -> T {
         self.fractions().get(point).copied().unwrap_or(T::ZERO)
     }
@@ -173,12 +174,12 @@ impl<T: Real> InnerPoints<T> {
 
 #[cfg(feature = "alloc")]
 impl<T: Real> InnerPoints<T> {
-    /// The parts, and the memory of pieces.
+    /// Returns the fractions, and the memory of pieces.
     pub fn fractions_and_memory(&mut self) -> (&[T], &mut PieceMemory<T>) {
         (&self.fractions, &mut self.piece_memory)
     }
 
-    /// With these points, where there were none.
+    /// Creates these points.
     ///
     /// # Errors
     /// [`OcpError::InvalidPoint`]
@@ -200,30 +201,30 @@ impl<T: Real> InnerPoints<T> {
         Ok(Self { fractions: parts, ..Self::default() })
     }
 
-    /// With costs at points too.
+    /// Enables costs at the points.
     pub fn with_costs_at_points(self) -> Self {
         Self { has_costs_at_points: true, ..self }
     }
 
-    /// Rows for a variable that has none, at all points and at the node if it is algebraic.
+    /// Adds rows for a variable at all points, and at the node if it is algebraic.
     pub fn add_variable(&mut self, variable: usize, nx: usize) {
         let points = usize::from(variable < nx)..=self.count();
         self.bounded_variables.extend(points.map(|point| (variable, point)));
     }
 
-    /// Whether a variable has rows.
+    /// Returns whether a variable has rows.
     pub fn has_variable(&self, variable: usize) -> bool {
         self.bounded_variables.iter().any(|&(other, _)| other == variable)
     }
 }
 
-/// The row of a path constraint at a point, from 1 on.
+/// Returns the row of a path constraint at a point, counted from 1.
 pub(in crate::ocp) fn inner_path_row<P: Formulation<T>, T: Real>(row: usize, point: usize) -> usize {
     node_row_count::<P, T>() + (point - 1) * P::Path::ROWS + row
 }
 
 #[cfg(feature = "alloc")]
-/// Whether dynamics can be integrated in pieces.
+/// Checks that the dynamics can be integrated in pieces.
 ///
 /// # Errors
 /// [`OcpError::Unsupported`]

@@ -1,4 +1,4 @@
-//! Memory for intervals that are integrated in pieces.
+//! Memory of intervals that are integrated in pieces.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::Constraints;
@@ -10,21 +10,21 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// What is known of the pieces of all intervals. Lists are empty where there are no points.
+/// The memory of the pieces of all intervals; empty if there are no points.
 #[derive(Clone, Debug)]
 pub(in crate::ocp) struct PieceMemory<T> {
-    /// Of every interval, at its node, its points and its end: `x`, `z`, and the columns of
+    /// For every interval, at its node, its points and its end: `x`, `z`, and the columns of
     /// `∂x/∂(x₀, u, p)` and of `∂z/∂(x₀, u, p)`.
     pub solutions: Vec<T>,
-    /// Variables of stages, with the states where pieces begin.
+    /// Variables of stages, with the states at the starts of pieces.
     pub v: Vec<T>,
-    /// Multipliers of ends of pieces, and of the pieces before.
+    /// Multipliers at the ends of the current pieces, and of the previous ones.
     pub multipliers: [Vec<T>; 2],
-    /// At every point of all intervals: weights of algebraic states.
+    /// Weights of algebraic states at every point of all intervals.
     pub weights: Vec<T>,
-    /// At every point of all intervals: the gradient of constraints by states.
+    /// Gradients of constraints by states at every point of all intervals.
     pub constraint_gradients: Vec<T>,
-    /// Of every interval `∇²` as six blocks, and integral costs: their value and their gradient.
+    /// For every interval: the value and the gradient of integral costs, and `∇²` as six blocks.
     pub cost_and_hessian_sums: Vec<T>,
     /// Derivatives over `(x, w, u, z)` at a point, and a product.
     pub extended_derivatives: Vec<T>,
@@ -48,7 +48,8 @@ impl<T> Default for PieceMemory<T> {
 }
 
 impl<T: Real> InnerPoints<T> {
-    /// Memory for the pieces of a problem, whose iterate has so many variables and multipliers.
+    /// Allocates memory for the pieces of a problem whose iterate has these numbers of variables
+    /// and multipliers.
     pub(in crate::ocp) fn allocate<P: Formulation<T>>(
         &mut self,
         Layout { intervals, free_count: free, .. }: Layout,
@@ -74,16 +75,16 @@ impl<T: Real> InnerPoints<T> {
     }
 }
 
-/// The sizes of what is known of a piece.
+/// Sizes of the memory of a piece.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct PieceSizes {
     /// `NX`, `NU`, `NP`, `NZ`
     pub dims: [usize; 4],
-    /// Points inside of an interval.
+    /// The number of points inside an interval.
     pub points: usize,
 }
 
-/// A place in an interval: its node, a point of it, or its end.
+/// The solution at a location of an interval: its node, a point, or its end.
 pub(in crate::ocp) struct PointSolution<'a, T> {
     pub x: &'a [T],
     pub z: &'a [T],
@@ -105,11 +106,11 @@ impl PieceSizes {
         let [nx, _, _, nz] = self.dims;
         (nx + nz) * (1 + self.inputs())
     }
-    /// Places of an interval: its node, its points, its end.
+    /// Returns the number of locations of an interval: node, points, end.
     pub fn point_count_with_ends(self) -> usize {
         self.points + 2
     }
-    /// Of the blocks `xx`, `xu`, `uu`, `xp`, `up`, `pp`.
+    /// Returns the lengths of the blocks `xx`, `xu`, `uu`, `xp`, `up`, `pp`.
     pub fn hessian_block_lens(self) -> [usize; 6] {
         let [nx, nu, np, _] = self.dims;
         [nx * nx, nx * nu, nu * nu, nx * np, nu * np, np * np]
@@ -117,19 +118,19 @@ impl PieceSizes {
     pub fn sums_len(self) -> usize {
         1 + self.inputs() + self.hessian_block_lens().iter().sum::<usize>()
     }
-    /// How many numbers all places of so many intervals are.
+    /// Returns the length of the solutions at all locations of the intervals.
     fn solutions_len(self, intervals: usize) -> usize {
         intervals * self.point_count_with_ends() * self.point_len()
     }
-    /// How many numbers second derivatives and integral costs are.
+    /// Returns the length of second derivatives and integral costs of the intervals.
     fn all_sums_len(self, intervals: usize) -> usize {
         intervals * self.sums_len()
     }
-    /// How many numbers a product of an interval is.
+    /// Returns the length of a product of an interval.
     fn product_len(self) -> usize {
         self.dims[0] * self.inputs()
     }
-    /// A place of an interval.
+    /// Returns the solution at a location of an interval.
     pub fn point_solution<T>(self, solutions: &[T], interval: usize, point: usize) -> PointSolution<'_, T> {
         let [nx, _, _, nz] = self.dims;
         let all = part(

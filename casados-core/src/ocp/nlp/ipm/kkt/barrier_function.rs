@@ -1,4 +1,4 @@
-//! Barrier function and violation at a point, and how the barrier function changes along a step.
+//! Barrier function `φ` and violation `θ` at a point, and the slope of the barrier function.
 
 use super::scaling::{gaps_with_units, row_values_with_units, sum_in_units};
 use crate::ocp::assembly::units::ScalingUnits;
@@ -7,10 +7,11 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::interior::{Inequalities, Iterate};
-use crate::qp::{Places, Solution, StageDims, add_symmetric, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, add_symmetric, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
-/// `Σ λ_e e + ½ q e²` of violations of soft sides, and `−Σ log` of slacks and violations.
+/// Returns `Σ λ_e e + ½ q e²` over violations of soft bounds, and `−Σ log` over slacks and
+/// violations.
 pub(in crate::ocp::nlp::ipm) fn penalties_and_barrier<T: Real>(
     inequalities: &Inequalities<'_, T>,
     slacks: &[T],
@@ -25,8 +26,8 @@ pub(in crate::ocp::nlp::ipm) fn penalties_and_barrier<T: Real>(
     (penalties, barrier)
 }
 
-/// Barrier function, in units of forces, and violation at the iterate itself, from residuals that
-/// are there.
+/// Returns barrier function (in units of the objective) and violation at the iterate, whose
+/// residuals must be up to date.
 pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     iterate: &Iterate<'_, T>,
     objective: f64,
@@ -34,7 +35,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     units: ScalingUnits<'_, T>,
 ) -> FilterPair {
     let (force, units) = (units.scaling.objective_unit, units.rows);
-    let inequalities = &iterate.sides;
+    let inequalities = &iterate.inequalities;
     let gaps = gaps_with_units(iterate.qp.dims, iterate.dynamics, units);
     let equations = row_values_with_units(inequalities.equations, inequalities.equation_residual, units);
     let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.residual_sum());
@@ -46,14 +47,14 @@ pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     FilterPair { objective: (objective + penalties + mu * barrier) / force, violation }
 }
 
-/// `∇φᵀ d`
+/// Returns the slope `∇φᵀ d`.
 pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
     iterate: &Iterate<'_, T>,
     mu: f64,
     scratch: &mut [T],
 ) -> f64 {
     let mut slope = T::ZERO;
-    for (place, stage) in Places::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
         let view = stage.arrays();
         let gradient = part_mut(scratch, 0, place.ld);
         copy_common(gradient, part(view.gradient, 0, place.ld));
@@ -61,7 +62,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
         let step = part(iterate.step, place.row, place.n);
         slope = gradient.iter().zip(step).fold(slope, |sum, (&g, &d)| sum + g * d);
     }
-    let inequalities = &iterate.sides;
+    let inequalities = &iterate.inequalities;
     let mut slope = slope.to_f64();
     for (&s, &d) in inequalities.slack.iter().zip(&*inequalities.slack_step) {
         slope -= mu * d.to_f64() / s.to_f64();
@@ -77,11 +78,11 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Objective, and the values of all rows at a point, in the units of the QP's bounds; ends of
-    /// intervals and constraints in `ends`.
+    /// Returns the objective, and writes the values of all rows at a point, in the units of the
+    /// QP's bounds, to `rows`; ends of intervals and constraints to `ends`.
     ///
     /// # Errors
-    /// Those of functions and integrators.
+    /// The errors of functions and integrators.
     pub(in crate::ocp::nlp::ipm) fn row_values_at(
         &mut self,
         point: &Solution<T, D, M>,
@@ -93,7 +94,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         let qp = qp.view();
         let mut values = ends.get(intervals_end(qp.dims)..).unwrap_or_default();
         let ((v, _), [mut given_lower, mut given_upper]) = (point.variables_and_costates(), given);
-        for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+        for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
             let rows = part_mut(rows, place.row, place.rows);
             copy_common(rows, part(v, place.v, place.n));
             let bounds = stage.g_bounds();
@@ -108,7 +109,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             for ((row, &value), ((&lower, &upper), (&given_lower, &given_upper))) in
                 rows.iter_mut().zip(of_stage).zip(limits)
             {
-                // Bounds of the QP are those that were given, and what its linear part leaves.
+                // Bounds of the QP are the given bounds minus the constant part of the
+                // linearisation.
                 let shift = if lower.is_finite() { lower - given_lower } else { upper - given_upper };
                 *row = if shift.is_finite() { value + shift } else { value };
             }
@@ -116,7 +118,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         Ok(objective)
     }
 
-    /// The sum of the gaps between the ends of intervals and the states that follow, in units.
+    /// Returns the sum of the continuity gaps, in units.
     pub(in crate::ocp::nlp::ipm) fn gap_sum_at(
         &self,
         point: &Solution<T, D, M>,
@@ -124,7 +126,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         units: &[T],
     ) -> f64 {
         let (mut sum, mut ends) = (0.0, ends);
-        for (next, place) in point.stages().zip(Places::<T>::new(point.dims())).skip(1) {
+        for (next, place) in point.stages().zip(StageOffsetsIter::<T>::new(point.dims())).skip(1) {
             let (phi, behind) = ends.split_at_checked(place.nx).unwrap_or_default();
             ends = behind;
             for ((&phi, &x), &unit) in phi.iter().zip(next.x).zip(part(units, place.row, place.nx)) {
@@ -135,7 +137,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 }
 
-/// Violations of sides and equations whose rows have such values, with such slacks.
+/// Returns the sum of the violations of inequalities and equations for given row values and slacks.
 pub(in crate::ocp::nlp::ipm) fn violation_sum<T: Real>(
     inequalities: &mut Inequalities<'_, T>,
     rows: &[T],

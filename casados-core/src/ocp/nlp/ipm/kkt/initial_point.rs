@@ -1,14 +1,14 @@
-//! The first point: inside of all bounds, with slacks and multipliers away from zero.
+//! The initial point: inside all bounds, with positive slacks and multipliers.
 
 use crate::ocp::assembly::units::ScalingUnits;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::qp::element::set;
 use crate::qp::interior::{Iterate, at};
-use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
+use crate::qp::{Bounds, QpView, SolutionView, StageOffsetsIter, part, part_mut};
 use crate::scalar::Real;
 
-/// Moves states and controls that have hard bounds away from these by `κ max(unit, |bound|)`,
-/// and by no more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
+/// Moves states and controls with hard bounds inside by `κ max(unit, |bound|)`, at most by `κ` of
+/// the distance between two bounds (Wächter and Biegler, section 3.6).
 pub(in crate::ocp::nlp::ipm) fn push_inside_bounds<T: Real>(
     qp: QpView<'_, T>,
     fixed: bool,
@@ -17,7 +17,7 @@ pub(in crate::ocp::nlp::ipm) fn push_inside_bounds<T: Real>(
     solution: &mut SolutionView<'_, T>,
 ) {
     let push = T::from_f64(push);
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
         let v = part_mut(solution.v, place.v, place.n);
         let (x, u) = v.split_at_mut_checked(place.nx).unwrap_or_default();
         if !(fixed && place.stage == 0) {
@@ -49,8 +49,8 @@ fn push_variables_inside<T: Real>(bounds: &Bounds<'_, T>, push: T, units: &[T], 
     }
 }
 
-/// Slacks at the distances from the bounds, and no less than `push`; multipliers of a warm start,
-/// or the unit of forces. Values are evaluated already, so that distances are in `scratch`.
+/// Sets slacks to the distances from the bounds, at least to `push`; and multipliers to those of a
+/// warm start, or to `objective_unit / unit`. `scratch` must contain the distances.
 pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
     iterate: &mut Iterate<'_, T>,
     options: &IpmOptions,
@@ -61,10 +61,9 @@ pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
 ) {
     let ([force, mu], units) = ([units.scaling.objective_unit, mu].map(T::from_f64), units.rows);
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     let count = inequalities.counts.sides();
-    // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are
-    // pushed.
+    // Variables are inside their hard bounds, and their slacks are exact. Other slacks are pushed.
     let general = super::newton::general_constraint_flags::<T>(iterate.qp, inequalities.rows);
     let rows = inequalities.rows.iter().map(|&row| at(units, row));
     for ((((slack, &distance), &bound), general), unit) in inequalities
@@ -76,7 +75,7 @@ pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
         .zip(rows)
     {
         let is_exact = !general && distance > T::ZERO;
-        // Bounds of general constraints are those of the QP, whose size says nothing.
+        // The bounds of general constraints in the QP are shifted: their size has no meaning.
         let size = if general { unit } else { bound.abs().max(unit) };
         *slack = if is_exact { distance } else { distance.max(push * size) };
     }
@@ -91,7 +90,7 @@ pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
     }
     for (j, &side) in inequalities.soft.iter().enumerate() {
         let (linear, quadratic) = (at(inequalities.linear, j as u32), at(inequalities.quadratic, j as u32));
-        // `λ + ν = linear + quadratic e`, from the start on.
+        // `λ + ν = linear + quadratic e` holds from the start.
         let unit = at(units, inequalities.rows.get(side as usize).copied().unwrap_or(u32::MAX));
         let violation = (at(inequalities.slack, side) - at(inequalities.scratch, side)).max(push * unit);
         let force = linear + quadratic * violation;

@@ -1,4 +1,4 @@
-//! Newton's equations of the barrier problem: their memory, scaling, first point and solution.
+//! Newton's equations of the barrier problem: dimensions, scaling, initial point and solution.
 
 pub(in crate::ocp::nlp::ipm) mod barrier_function;
 pub(in crate::ocp::nlp::ipm) mod dimensions;

@@ -1,16 +1,18 @@
-//! Newton's equations of the barrier problem, over the memory of a run.
+//! Newton's equations of the barrier problem, in the memory of a run.
 //!
-//! With the QP written at the iterate, one step of the interior point of QPs from there is a step
-//! of that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
+//! With the QP written at the iterate, one step of the QP's interior point is the Newton step of
+//! the nonlinear barrier problem: same slacks, same multipliers, exact Hessians.
 
 use super::dimensions::{KktDimensions, reading_options};
 use super::workspace::Workspace;
 use crate::ocp::assembly::units::ProblemScaling;
 use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
-use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, copy_common, take_mut};
+use crate::qp::{
+    QpError, QpField, QpView, Residuals, SolutionView, StageOffsetsIter, Store, copy_common, take_mut,
+};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
-/// The iterate of Newton's method in its memory, whose contents stay as they were.
+/// Returns the iterate of Newton's method as a view of its memory, whose contents are unchanged.
 ///
 /// # Errors
 /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -21,23 +23,23 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     indices: &'a mut impl Store<u32>,
 ) -> Result<Iterate<'a, T>, QpError> {
     let numbers = numbers.at_least(lengths.number_count, QpField::Numbers)?;
-    // Those of inequalities are of any length: behind the others, all of which are whole registers.
+    // Arrays of inequalities have any length: they follow the others, which are whole registers.
     let counts = lengths.counts;
-    let others = lengths.number_count.saturating_sub(counts.numbers() + counts.equations);
+    let others = lengths.number_count.saturating_sub(counts.memory_len() + counts.equations);
     let (mut numbers, mut inequality_numbers) = numbers.split_at_mut_checked(others).unwrap_or_default();
     let mut indices = indices.at_least(counts.indices(), QpField::Indices)?;
     let first =
         if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
     let mut inequalities = Inequalities::new(counts, &mut inequality_numbers, &mut indices);
-    let ProblemScaling { objective_unit: force, min_row_unit: least } = lengths.scaling;
-    inequalities.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
+    let ProblemScaling { objective_unit: force, tolerance: least } = lengths.scaling;
+    inequalities.dual_regularisation = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
-    iterate.sides.free_step = take_mut(&mut inequality_numbers, counts.equations);
+    iterate.inequalities.equation_multiplier_steps = take_mut(&mut inequality_numbers, counts.equations);
     Ok(iterate)
 }
 
-/// As [`kkt_view`], where the QP is new: sides are listed, with its bounds and penalties. What
-/// equations give way is measured in `units` of their rows.
+/// Returns the view of [`kkt_view`] for a new QP: lists its inequalities with their bounds and
+/// penalties. The dual regularisation of equations is scaled by the `units` of their rows.
 ///
 /// # Errors
 /// As [`kkt_view`].
@@ -49,17 +51,17 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
     units: &[T],
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
-    iterate.sides.list(qp, &reading_options(qp));
-    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.scaling.min_row_unit));
-    for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
+    iterate.inequalities.list(qp, &reading_options(qp));
+    let (equations, least) = (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.tolerance));
+    for (stiffness, &row) in iterate.inequalities.stiffness_scale.iter_mut().zip(equations) {
         let ratio = least / at(units, row);
         *stiffness = ratio * ratio;
     }
     Ok(iterate)
 }
 
-/// Evaluates all residuals at a point with its multipliers `π`: the largest of those of the
-/// problem, and what violations of soft bounds cost.
+/// Evaluates all residuals at a point with its multipliers `π`. Returns the largest residuals of
+/// the problem, and the penalties of violated soft bounds.
 pub(in crate::ocp::nlp::ipm) fn evaluate_residuals<T: Real>(
     iterate: &mut Iterate<'_, T>,
     at: &mut SolutionView<'_, T>,
@@ -81,7 +83,7 @@ struct EvaluateResiduals<'r, 'a, 's, T> {
     output: &'s mut (Residuals, f64),
 }
 
-compiled!(/// See [`Evaluate`].
+compiled!(/// See [`EvaluateResiduals`].
 EvaluateResidualsCompiled: EvaluateResiduals<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
@@ -89,12 +91,13 @@ impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, pi, output: found } = self;
         iterate.evaluate_with_costates::<E>(pi);
-        let penalties = iterate.sides.violation_cost().to_f64();
+        let penalties = iterate.inequalities.violation_cost().to_f64();
         *found = (iterate.point_residuals::<E>().into(), penalties);
     }
 }
 
-/// Residuals of what is linear in the QP at the iterate, after its constants have changed.
+/// Evaluates the residuals that are linear in the QP at the iterate, after a change of its
+/// constants.
 pub(in crate::ocp::nlp::ipm) fn evaluate_linear_residuals<T: Real>(iterate: &mut Iterate<'_, T>) {
     T::run_precompiled::<EvaluateLinearResidualsCompiled>(EvaluateLinearResiduals { iterate });
 }
@@ -103,7 +106,7 @@ struct EvaluateLinearResiduals<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
 }
 
-compiled!(/// See [`EvaluateValues`].
+compiled!(/// See [`EvaluateLinearResiduals`].
 EvaluateLinearResidualsCompiled: EvaluateLinearResiduals<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for EvaluateLinearResiduals<'_, '_, T> {
@@ -113,10 +116,10 @@ impl<T: Real> Registers<T> for EvaluateLinearResiduals<'_, '_, T> {
     }
 }
 
-/// A step towards products of slacks and multipliers that are all `μ`.
+/// Factorises, and computes the Newton step towards `s λ = μ`.
 ///
 /// # Errors
-/// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
+/// [`QpError::NotConvex`] if the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
 pub(in crate::ocp::nlp::ipm) fn newton_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
@@ -127,11 +130,11 @@ pub(in crate::ocp::nlp::ipm) fn newton_step<T: Real>(
     solve_newton(iterate, mu, false, true)
 }
 
-/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
-/// that are there.
+/// Computes the step towards `μ` with the same factors; `corrected` adds the products of the
+/// present slack and multiplier steps.
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn resolve<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: T,
@@ -165,7 +168,7 @@ struct NewtonStep<'r, 'a, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`Step`].
+compiled!(/// See [`NewtonStep`].
 NewtonStepCompiled: NewtonStep<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
@@ -173,27 +176,26 @@ impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, mu, corrected, factor, result } = self;
         if corrected {
-            iterate.sides.corrector_targets(mu);
+            iterate.inequalities.corrector_targets(mu);
         } else {
-            iterate.sides.centring_targets(mu);
+            iterate.inequalities.centring_targets(mu);
         }
-        iterate.sides.free_step.fill(T::ZERO);
+        iterate.inequalities.equation_multiplier_steps.fill(T::ZERO);
         *result = iterate.newton::<E>(factor);
     }
 }
 
-/// Solves with the same factors, at most.
+/// The largest number of refinements with the same factors.
 const MAX_REFINEMENTS: usize = 3;
-/// Another one follows where it leaves this part of what equations lack.
+/// Refinement continues while it leaves at most this fraction of the residual of the equations.
 const REFINEMENT_GAIN: f64 = 0.5;
 
-/// What equations give way to their multipliers is taken back: the step is that of the system
-/// without dual regularisation, as far as rounding permits, where the same factors are enough for
-/// that. Each solve begins at the multipliers of the one before (the proximal method of
+/// Iterative refinement: removes the dual regularisation of equations from the step, up to
+/// rounding, with the same factors. Each solve starts from the last multipliers (proximal method of
 /// multipliers).
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     units: &[T],
@@ -212,11 +214,28 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     Ok(())
 }
 
-/// The largest residual of an equation after the full step, in units; zero if none is more than
-/// rounding.
+/// The residual that refinement leaves in an equation, as a fraction of its value and unit.
+fn refined_equation_residual<T: Real>() -> f64 {
+    Scalar::powf(T::EPSILON, 2.0 / 3.0)
+}
+
+/// Returns the residuals that full steps leave in equations: as a fraction of their values, and as
+/// a sum in units. Zero without equations.
+pub(in crate::ocp::nlp::ipm) fn equation_residuals_after_step<T: Real>(
+    iterate: &Iterate<'_, T>,
+    units: &[T],
+) -> (f64, f64) {
+    let rows = &*iterate.inequalities.equations;
+    let residual = if rows.is_empty() { 0.0 } else { refined_equation_residual::<T>() };
+    let sizes = rows.iter().map(|&row| 1.0 + (at(iterate.v, row) / at(units, row)).abs().to_f64());
+    (residual, residual * sizes.sum::<f64>())
+}
+
+/// The largest residual of an equation after the full step, in units; zero if all are rounding
+/// errors.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
-    let inequalities = &iterate.sides;
-    let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
+    let inequalities = &iterate.inequalities;
+    let rounding = refined_equation_residual::<T>();
     let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
     let lacks = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
@@ -235,7 +254,7 @@ struct RefineStep<'r, 'a, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`Refine`].
+compiled!(/// See [`RefineStep`].
 RefineStepCompiled: RefineStep<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for RefineStep<'_, '_, T> {
@@ -246,21 +265,21 @@ impl<T: Real> Registers<T> for RefineStep<'_, '_, T> {
     }
 }
 
-/// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
-/// back bit by bit.
+/// Computes the multipliers `π` after the full step into `work.next_costates`. Restores the point
+/// and its multipliers bit by bit.
 pub(in crate::ocp::nlp::ipm) fn costates_after_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Workspace<'_, T>,
     delta: T,
 ) {
     copy_common(work.row_values, iterate.v);
-    copy_common(work.trial_slacks, iterate.sides.multiplier);
-    copy_common(work.saved_free_step, iterate.sides.free);
+    copy_common(work.trial_slacks, iterate.inequalities.multiplier);
+    copy_common(work.saved_equation_multipliers, iterate.inequalities.equation_multipliers);
     iterate.proximal = delta;
     T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
     copy_common(iterate.v, work.row_values);
-    copy_common(iterate.sides.multiplier, work.trial_slacks);
-    copy_common(iterate.sides.free, work.saved_free_step);
+    copy_common(iterate.inequalities.multiplier, work.trial_slacks);
+    copy_common(iterate.inequalities.equation_multipliers, work.saved_equation_multipliers);
 }
 
 struct CostatesAfterStep<'r, 'a, 's, T> {
@@ -268,7 +287,7 @@ struct CostatesAfterStep<'r, 'a, 's, T> {
     pi: &'s mut [T],
 }
 
-compiled!(/// See [`After`].
+compiled!(/// See [`CostatesAfterStep`].
 CostatesAfterStepCompiled: CostatesAfterStep<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
@@ -279,23 +298,24 @@ impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
     }
 }
 
-/// The weight of the identity in place of the Hessian in [`least_squares`], in units of forces.
+/// The weight of the identity that replaces the Hessian in [`least_squares_multipliers`], in units
+/// of the objective.
 const IDENTITY_HESSIAN_WEIGHT: f64 = 1e8;
 
-/// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
-/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are
-/// given. These are Newton's equations with a large multiple of the identity for a Hessian, and no
-/// residuals of the constraints (Wächter and Biegler, section 3.6).
+/// Computes least-squares multipliers, which minimise the gradient of the Lagrangian: `π` into
+/// `work.next_costates`, those of general constraints into `work.hessian_multipliers`. The
+/// multipliers of bounds of variables are given. Solves Newton's equations with a large multiple of
+/// the identity as Hessian, and without constraint residuals (Wächter and Biegler, section 3.6).
 ///
 /// # Errors
-/// Those of the recursion.
+/// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Workspace<'_, T>,
     objective_unit: f64,
 ) -> Result<(), QpError> {
     let identity = T::from_f64(IDENTITY_HESSIAN_WEIGHT * objective_unit);
-    copy_common(work.trial_slacks, iterate.sides.multiplier);
+    copy_common(work.trial_slacks, iterate.inequalities.multiplier);
     set_general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
     T::run_precompiled::<LeastSquaresMultipliersCompiled>(LeastSquaresMultipliers {
@@ -305,7 +325,7 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
         result: &mut result,
     });
     result?;
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     copy_common(work.hessian_multipliers, inequalities.multiplier_step);
     inequalities.multiplier_step.fill(T::ZERO);
     set_general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
@@ -313,13 +333,13 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate.proximal = identity;
     T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
     copy_common(iterate.v, work.row_values);
-    copy_common(iterate.sides.multiplier, work.trial_slacks);
+    copy_common(iterate.inequalities.multiplier, work.trial_slacks);
     Ok(())
 }
 
-/// Sets multipliers of sides of general constraints.
+/// Sets the multipliers of the inequalities of general constraints.
 fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     let count = inequalities.counts.sides();
     let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);
     for (i, (multiplier, general)) in inequalities.multiplier.iter_mut().zip(general).enumerate().take(count)
@@ -330,17 +350,18 @@ fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn
     }
 }
 
-/// Whether rows, first those of lower and then those of upper sides, belong to general constraints.
+/// For each row of inequalities (lower bounds, then upper bounds): whether it is a general
+/// constraint.
 pub(in crate::ocp::nlp::ipm) fn general_constraint_flags<'a, T: Real>(
     qp: QpView<'a, T>,
     rows: &'a [u32],
 ) -> impl Iterator<Item = bool> + 'a {
-    let mut places = Places::<T>::new(qp.dims).peekable();
+    let mut places = StageOffsetsIter::<T>::new(qp.dims).peekable();
     let mut last = 0;
     rows.iter().map(move |&row| {
         let row = row as usize;
         if row < last {
-            places = Places::<T>::new(qp.dims).peekable();
+            places = StageOffsetsIter::<T>::new(qp.dims).peekable();
         }
         last = row;
         while places.next_if(|place| row >= place.row + place.rows).is_some() {}
@@ -355,7 +376,7 @@ struct LeastSquaresMultipliers<'r, 'a, 's, T> {
     result: &'r mut Result<(), QpError>,
 }
 
-compiled!(/// See [`LeastSquares`].
+compiled!(/// See [`LeastSquaresMultipliers`].
 LeastSquaresMultipliersCompiled: LeastSquaresMultipliers<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for LeastSquaresMultipliers<'_, '_, '_, T> {
@@ -366,10 +387,10 @@ impl<T: Real> Registers<T> for LeastSquaresMultipliers<'_, '_, '_, T> {
         iterate.evaluate_with_costates::<E>(pi);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;
-        let inequalities = &mut iterate.sides;
+        let inequalities = &mut iterate.inequalities;
         inequalities.residual.fill(T::ZERO);
         inequalities.equation_residual.fill(T::ZERO);
-        inequalities.free_step.fill(T::ZERO);
+        inequalities.equation_multiplier_steps.fill(T::ZERO);
         inequalities.target.fill(T::ZERO);
         inequalities.inverse.fill(T::ZERO);
         let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);

@@ -1,4 +1,4 @@
-//! Newton's step, with as much on the diagonal (`δ_w`) as makes the reduced Hessian positive
+//! Newton steps with inertia correction: `δ_w` on the diagonal makes the reduced Hessian positive
 //! definite.
 
 use super::newton::newton_step;
@@ -6,44 +6,45 @@ use crate::qp::QpError;
 use crate::qp::interior::Iterate;
 use crate::scalar::Real;
 
-/// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
+/// The first `δ_w`, in units of the objective over squares of units of variables, as all `δ_w`
+/// here.
 const FIRST_HESSIAN_PERTURBATION: f64 = 1e-4;
-/// With this on the diagonal, directions without curvature may be left alone.
+/// The smallest `δ_w` with which directions of vanishing pivots are acceptable.
 const VANISHING_PIVOT_PERTURBATION: f64 = 1e-6;
-/// `δ_w` is never less.
+/// The smallest positive `δ_w`.
 const MIN_HESSIAN_PERTURBATION: f64 = 1e-20;
-/// Where this is not enough nothing is.
+/// The upper limit of `δ_w`; the inertia correction fails beyond it.
 const MAX_HESSIAN_PERTURBATION: f64 = 1e20;
-/// What `δ_w` grows by where it is not enough: while none is known, and after that.
+/// The growth factors of `δ_w`: in the first inertia correction, and in later ones.
 const PERTURB_INC_FACT_FIRST: f64 = 100.0;
 const PERTURB_INC_FACT: f64 = 8.0;
-/// The first `δ_w` of an iteration is this part of the last one.
+/// The ratio of the first `δ_w` of an iteration to the last `δ_w`.
 const PERTURB_DEC_FACT: f64 = 1.0 / 3.0;
-/// A step that goes no farther than this part of what bounds leave of it is short,
+/// Steps up to this fraction of the step to the boundary are short.
 const SHORT_STEP_FRACTION: f64 = 0.1;
-/// and after so many in sequence the next ones are damped,
+/// The number of consecutive short steps after which the steps are damped.
 const SHORT_STEPS_BEFORE_DAMPING: usize = 8;
-/// at first by this, as `δ_w` is,
+/// The first damping, in the unit of `δ_w`.
 const FIRST_DAMPING: f64 = 1e-3;
-/// and not at all any more where this does not help.
+/// The largest damping; damping is dropped above it.
 const MAX_DAMPING: f64 = 1e2;
 
-/// What is remembered of `δ_w`.
+/// State of the regularisation `δ_w` and of the damping.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp::nlp) struct Regularisation {
-    /// The last one that curvature asked for.
+    /// The last `δ_w` of an inertia correction.
     last_delta: f64,
-    /// No less is taken while steps are short.
+    /// The lower bound of `δ_w` after short steps.
     damping: f64,
-    /// So many steps in sequence were short.
+    /// Consecutive short steps.
     short_steps: usize,
 }
 
 impl Regularisation {
-    /// A step was accepted that goes so far of what bounds leave of it. Where constraints are
-    /// curved and the reduced Hessian is nearly singular, full steps leave the constraints at once,
-    /// and what the line search leaves of them is nothing: as in a trust region shorter steps in
-    /// another direction go farther.
+    /// Updates the damping after an accepted step; `step_fraction` is its length relative to the
+    /// step to the boundary. With curved constraints and a nearly singular reduced Hessian full
+    /// steps leave the constraints, and the line search makes them very short. As in a trust
+    /// region, damped directions allow longer steps.
     pub fn update_damping(&mut self, step_fraction: f64) {
         if step_fraction >= SHORT_STEP_FRACTION {
             self.short_steps = 0;
@@ -62,10 +63,11 @@ impl Regularisation {
         }
     }
 
-    /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
+    /// Computes the Newton step towards `μ`, and returns its `δ_w` (Wächter and Biegler, algorithm
+    /// IC).
     ///
     /// # Errors
-    /// Those of the recursion.
+    /// The errors of the recursion.
     pub fn compute_regularised_step<T: Real>(
         &mut self,
         iterate: &mut Iterate<'_, T>,
@@ -95,7 +97,7 @@ impl Regularisation {
         Err(last_error)
     }
 
-    /// One factorisation; a step that is not finite is no step.
+    /// Factorises once; a non-finite step is an error.
     fn try_factorisation<T: Real>(
         &self,
         iterate: &mut Iterate<'_, T>,
@@ -107,7 +109,7 @@ impl Regularisation {
             Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
             }
-            // Directions in which pivots vanished would not move at all.
+            // Directions with vanishing pivots would not move.
             Ok(()) if iterate.riccati.regularised > 0 && delta < VANISHING_PIVOT_PERTURBATION => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
             }

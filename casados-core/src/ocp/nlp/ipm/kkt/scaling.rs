@@ -1,30 +1,30 @@
-//! Residuals in units, relative to multipliers.
+//! Residuals in units, relative to the mean of the multipliers.
 //!
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), equations (5) and (6).
 
 use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ScalingUnits, tolerance_factor};
 use crate::qp::interior::{Inequalities, Iterate, at};
-use crate::qp::{Places, Residuals, StageDims, nan_max, part};
+use crate::qp::{Residuals, StageDims, StageOffsetsIter, nan_max, part};
 use crate::scalar::Real;
 
-/// Gaps of a state need not be less than this part of it times the tolerance.
+/// The unit of a state's gap is at least this fraction of the state.
 const MIN_RELATIVE_GAP_UNIT: f64 = 1e-5;
-/// `s_max`: a mean multiplier that is larger relaxes tolerances.
+/// `s_max`: a larger mean of the multipliers scales residuals down.
 const S_MAX: f64 = 100.0;
 
-/// Gaps of dynamics, each with the unit of its state.
+/// Returns the gaps of the dynamics, each with the unit of its state.
 pub(in crate::ocp::nlp::ipm) fn gaps_with_units<'a, T: Real>(
     dims: &'a [StageDims],
     gaps: &'a [T],
     units: &'a [T],
 ) -> impl Iterator<Item = (T, T)> + 'a {
-    Places::<T>::new(dims).flat_map(move |place| {
+    StageOffsetsIter::<T>::new(dims).flat_map(move |place| {
         let gaps = part(gaps, place.dynamics, place.next);
         gaps.iter().copied().zip(part(units, place.row + place.rows, place.next).iter().copied())
     })
 }
 
-/// Numbers of sides, each with the unit of its row.
+/// Returns values of inequalities, each with the unit of its row.
 pub(in crate::ocp::nlp::ipm) fn row_values_with_units<'a, T: Real>(
     rows: &'a [u32],
     values: &'a [T],
@@ -33,23 +33,23 @@ pub(in crate::ocp::nlp::ipm) fn row_values_with_units<'a, T: Real>(
     values.iter().copied().zip(rows.iter().map(|&row| at(units, row)))
 }
 
-/// The sum of sizes in their units.
+/// Returns the sum of the absolute values in their units.
 pub(in crate::ocp::nlp::ipm) fn sum_in_units<T: Real>(values: impl Iterator<Item = (T, T)>) -> f64 {
     values.fold(0.0, |sum, (value, unit)| sum + (value / unit).abs().to_f64())
 }
 
 /// Residuals relative to units.
 pub(in crate::ocp::nlp::ipm) struct ScaledResiduals {
-    /// Of the barrier problem: all of them, and what products are divided by.
+    /// Residuals of the barrier problem, and the divisor of its complementarity.
     pub barrier_residuals: (Residuals, f64),
-    /// The largest of those that are compared with tolerances.
+    /// The largest residual that is compared with tolerances.
     pub nlp_error: f64,
-    /// The largest of them but complementarity.
+    /// The same, without complementarity.
     pub error_without_complementarity: f64,
 }
 
-/// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
-/// is that of all of them, `s_c` that of sides.
+/// Scales residuals by units, and by the means of large multipliers: `s_d` for all multipliers,
+/// `s_c` for those of inequalities.
 pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
@@ -58,7 +58,7 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     stage_residual: f64,
 ) -> ScaledResiduals {
     let (force, units) = (units.scaling.objective_unit, units.rows);
-    let (inequalities, dims) = (&iterate.sides, iterate.qp.dims);
+    let (inequalities, dims) = (&iterate.inequalities, iterate.qp.dims);
     let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
     let bound_multiplier_sum =
         row_values_with_units(inequalities.rows, inequalities.multiplier, units).fold(0.0, size);
@@ -71,7 +71,8 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
         },
     );
     let equation_multiplier_sum =
-        row_values_with_units(inequalities.equations, inequalities.free, units).fold(0.0, size);
+        row_values_with_units(inequalities.equations, inequalities.equation_multipliers, units)
+            .fold(0.0, size);
     let (all, count) = gaps_with_units(dims, pi, units)
         .fold((inequality_multiplier_sum + equation_multiplier_sum, 0), |(sum, count), pair| {
             (size(sum, pair), count + 1)
@@ -108,8 +109,8 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     }
 }
 
-/// The largest gap in units of states that are not above one, nor below what rounding leaves of
-/// states.
+/// Returns the largest gap in units of the states, which are at most one and at least
+/// [`MIN_RELATIVE_GAP_UNIT`] of the state.
 fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let rounding = T::from_f64(MIN_RELATIVE_GAP_UNIT);
     let coupling = iterate
@@ -117,7 +118,7 @@ fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
         .as_ref()
         .map_or(T::ZERO, |coupling| coupling.residual.iter().fold(T::ZERO, |m, gap| nan_max(m, gap.abs())));
     let mut largest = coupling;
-    for place in Places::<T>::new(iterate.qp.dims) {
+    for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
         let begin = place.row + place.rows;
         let next = part(iterate.v, begin, place.next).iter().zip(part(units, begin, place.next));
         for (&gap, (&x, &unit)) in part(iterate.dynamics, place.dynamics, place.next).iter().zip(next) {
@@ -127,7 +128,7 @@ fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     largest.to_f64()
 }
 
-/// The largest residual of sides and equations in the units of their rows.
+/// Returns the largest residual of inequalities and equations in the units of their rows.
 fn largest_scaled_inequality<T: Real>(
     inequalities: &Inequalities<'_, T>,
     units: &[T],

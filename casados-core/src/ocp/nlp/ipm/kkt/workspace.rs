@@ -1,4 +1,4 @@
-//! Memory of a run beside that of Newton's equations.
+//! Memory of a run except that of Newton's equations.
 
 use super::dimensions::KktDimensions;
 use crate::ocp::nlp::elastic_mode;
@@ -6,34 +6,34 @@ use crate::qp::interior::{Counts, Extent};
 use crate::qp::{StageDims, take_mut};
 use crate::scalar::Real;
 
-/// Memory beside that of Newton's equations.
+/// Memory of a run except that of Newton's equations.
 pub(in crate::ocp::nlp::ipm) struct Workspace<'a, T> {
-    /// Ends of intervals and constraints at a point that is tried.
+    /// Ends of intervals and constraints at the trial point.
     pub interval_ends: &'a mut [T],
-    /// Values of rows there.
+    /// Values of rows at the trial point.
     pub row_values: &'a mut [T],
-    /// Slacks there.
+    /// Slacks at the trial point.
     pub trial_slacks: &'a mut [T],
-    /// The step before corrections.
+    /// The step before second-order corrections.
     pub saved_step: &'a mut [T],
     pub saved_slack_step: &'a mut [T],
     pub saved_multiplier_step: &'a mut [T],
-    pub saved_free_step: &'a mut [T],
+    pub saved_equation_multipliers: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub next_costates: &'a mut [T],
-    /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
-    /// of the barrier go as far as they stay positive.
+    /// Multipliers of inequalities in the Hessian. They take the primal step length, the
+    /// multipliers of the barrier problem the dual one.
     pub hessian_multipliers: &'a mut [T],
     /// Units of variables and constraints.
     pub units: &'a mut [T],
-    /// Over the variables of a stage.
+    /// Scratch memory for the variables of a stage.
     pub scratch: &'a mut [T],
-    /// Linear penalties as they were given.
+    /// The given linear penalties.
     pub saved_penalties: &'a mut [T],
 }
 
 impl<'a, T: Real> Workspace<'a, T> {
-    /// How many numbers it takes.
+    /// The length of the memory.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
         let (pairs, Extent { ld, end, .. }) = (counts.pair_count(), Extent::of::<T>(dims));
         ends + 3 * end.row
@@ -44,7 +44,7 @@ impl<'a, T: Real> Workspace<'a, T> {
             + elastic_mode::penalty_memory_len(dims)
     }
 
-    /// In memory of that length, whose contents stay.
+    /// A view of memory of that length, whose contents are unchanged.
     pub fn new(ends: usize, capacity: &KktDimensions, mut memory: &'a mut [T]) -> Self {
         let (pairs, end) = (capacity.counts.pair_count(), capacity.extent.end);
         let rest = &mut memory;
@@ -55,7 +55,7 @@ impl<'a, T: Real> Workspace<'a, T> {
             saved_step: take_mut(rest, end.row),
             saved_slack_step: take_mut(rest, pairs),
             saved_multiplier_step: take_mut(rest, pairs),
-            saved_free_step: take_mut(rest, capacity.counts.equations),
+            saved_equation_multipliers: take_mut(rest, capacity.counts.equations),
             next_costates: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
             units: take_mut(rest, end.row),

@@ -1,4 +1,4 @@
-//! How a run may end, from residuals of an iterate.
+//! Convergence tests.
 
 use super::elastic_mode;
 use super::phase;
@@ -14,7 +14,7 @@ use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// What follows the residuals of an iteration.
+    /// Determines the next action from the residuals of an iterate.
     pub(in crate::ocp::nlp::ipm) fn check_convergence<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -56,7 +56,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 impl RunState<'_> {
-    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
+    /// is far too large. Returns whether it has been replaced.
     fn rescale_objective<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,

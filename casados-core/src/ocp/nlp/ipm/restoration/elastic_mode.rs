@@ -1,4 +1,4 @@
-//! Penalties where no step makes progress, and what they tell of a problem without a solution.
+//! Elastic mode after failed steps, and its verdict of infeasibility.
 
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -11,14 +11,14 @@ use crate::ocp::solution::outcome::Status;
 use crate::qp::StageDims;
 use crate::scalar::Real;
 
-/// Penalties grow to this multiple of the first.
+/// The largest ratio of penalties to the first ones.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
-/// A violation that larger penalties do not make smaller than this part of it is there to stay.
+/// A violation is stationary if a larger penalty leaves more than this fraction of it.
 const STATIONARY_ELASTIC_RATIO: f64 = 0.9;
-/// The barrier parameter of new penalties, in units of forces.
+/// The first barrier parameter of elastic mode, in units of the objective.
 const ELASTIC_MU: f64 = 0.1;
 
-/// The hard bound that is violated most, in units, while penalties stand for it.
+/// The largest violation of a hard bound in elastic mode, in units.
 pub(in crate::ocp::nlp::ipm) fn largest_elastic_violation<
     P: Program<T>,
     T: Real,
@@ -32,10 +32,12 @@ pub(in crate::ocp::nlp::ipm) fn largest_elastic_violation<
     state.elastic_penalty.and_then(|_| ocp.largest_hard_violation(saved_penalties, units).0)
 }
 
-/// The end of a run at a stationary point, where violations cost so much; nothing where penalties
-/// stand for bounds and larger ones may help. Near a minimum `v̄` of `f + ρ θ` a point without
-/// violation has an objective of `f(v̄) + ρ θ(v̄)` at least: a violation that costs less than the
-/// objective has changed by on the way may be there because it pays.
+/// Returns the status at a stationary point whose violations have the penalty `penalty_cost`;
+/// `None` if penalties are increased instead.
+///
+/// Near a minimum `v̄` of `f + ρ θ` a feasible point has at least the objective `f(v̄) + ρ θ(v̄)`.
+/// If the penalty is less than the change of the objective since the start, the violation may still
+/// pay off.
 pub(in crate::ocp::nlp::ipm) fn status_at_stationary_point<
     P: Program<T>,
     T: Real,
@@ -61,7 +63,7 @@ pub(in crate::ocp::nlp::ipm) fn status_at_stationary_point<
     None
 }
 
-/// Penalties, in units, in place of hard bounds; slacks begin anew.
+/// Replaces hard bounds by penalties, in units; slacks are initialised again.
 pub(in crate::ocp::nlp::ipm) fn set_elastic_penalties<
     P: Program<T>,
     T: Real,

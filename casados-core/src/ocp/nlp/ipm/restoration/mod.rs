@@ -1,4 +1,4 @@
-//! Restoration: violations alone, penalties of bounds, a second attempt, and verdicts.
+//! Recovery from failed steps: restoration phase, elastic mode, restart; and verdicts.
 
 pub(in crate::ocp::nlp::ipm) mod convergence;
 pub(in crate::ocp::nlp::ipm) mod elastic_mode;

@@ -1,14 +1,14 @@
-//! The restoration phase: violations of hard bounds alone are made small, from where no step made
-//! progress. Either a point without violations is found, and the run goes on from there, or one
-//! where the sum of violations is stationary.
+//! The restoration phase after a failed step: it minimises the violations of hard bounds. It ends
+//! at a point with small violations, from which the run continues, or where the sum of violations
+//! is stationary.
 //!
 //! ```text
 //! min  Σ e / unit        x_{k+1} = φ(x_k, u_k),  σ (g(v) − bound) = s − e,  s, e ≥ 0
 //! ```
 //!
-//! The objective has no gradient; its curvature, and what the regularisation adds, keep steps short
-//! where violations do not say how far to go. J. Nocedal, S. J. Wright, "Numerical Optimization",
-//! sections 18.6 and 19.5; A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.3.
+//! The gradient of the objective is omitted. Its curvature and the regularisation limit steps along
+//! which violations do not change. J. Nocedal, S. J. Wright, "Numerical Optimization", sections
+//! 18.6 and 19.5; A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.3.
 
 use super::elastic_mode::{self, set_elastic_penalties};
 use crate::ocp::formulation::instance::Ocp;
@@ -26,15 +26,16 @@ use crate::qp::interior::{Inequalities, at};
 use crate::qp::{StageDims, Store};
 use crate::scalar::{Real, Scalar};
 
-/// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
-/// of the objective is small.
+/// The ratio of the objective unit in the restoration phase to that of the problem. It makes the
+/// curvature of the objective small.
 const RESTORATION_PENALTY_SCALING: f64 = 1e3;
-/// Where violations are no more than this, a run begins with a monotone barrier parameter first.
+/// With violations up to this one, the first recovery is a monotone barrier instead of a
+/// restoration phase.
 const MONOTONE_RETRY_VIOLATION: f64 = 1e-2;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Goes on where no step makes progress: violations alone, then with a monotone barrier
-    /// parameter, then with penalties. The status if all of that has been tried.
+    /// Recovers from a failed step: by a restoration phase, then a monotone barrier, then elastic
+    /// mode. Returns a status if all have been tried.
     pub(in crate::ocp::nlp::ipm) fn recover_from_failed_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -53,7 +54,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             set_elastic_penalties(ocp, state, (penalties, units), self.options.elastic_penalty);
             return None;
         }
-        // Near a feasible point it is not violations that hinder a first attempt.
+        // Near a feasible point the first failure is not caused by violations.
         let is_violated = state.violation
             > if state.adaptive_mu.allows_free_mode() { MONOTONE_RETRY_VIOLATION } else { SMALL_VIOLATION };
         if self.options.elastic
@@ -68,7 +69,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             return None;
         }
         if state.adaptive_mu.allows_free_mode() {
-            // From the best point on, as carefully as may be.
+            // Continue from the best iterate.
             ocp.restore_best_iterate(&self.best_iterate);
             state.begin_monotone_mode(&self.options);
             return None;
@@ -76,14 +77,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if state.elastic_penalty.is_some() || !self.options.elastic {
             return Some(Status::NoProgress);
         }
-        // Where no step made progress is no place to begin.
+        // The last iterate is a poor start.
         ocp.restore_best_iterate(&self.best_iterate);
         set_elastic_penalties(ocp, state, (penalties, units), self.options.elastic_penalty);
         None
     }
 }
 
-/// Begins a phase.
+/// Enters the restoration phase.
 fn enter_restoration<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut RunState<'_>,
@@ -96,7 +97,7 @@ fn enter_restoration<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]
     state.dimensions.in_restoration = true;
 }
 
-/// Ends it: bounds are as hard as they were.
+/// Ends the restoration phase: restores the hard bounds.
 pub(in crate::ocp::nlp::ipm) fn exit_restoration<
     P: Program<T>,
     T: Real,
@@ -116,7 +117,7 @@ pub(in crate::ocp::nlp::ipm) fn exit_restoration<
     state.begin_monotone_mode(options);
 }
 
-/// What follows an iterate of a phase: the end of the run, the end of the phase, or nothing.
+/// Returns the end of the run, a reevaluation after the end of the phase, or `None`.
 pub(in crate::ocp::nlp::ipm) fn check_restoration<
     P: Program<T>,
     T: Real,
@@ -141,7 +142,8 @@ pub(in crate::ocp::nlp::ipm) fn check_restoration<
     None
 }
 
-/// Slacks and violations in the middle: both products are `μ`, and distances are as they are.
+/// Puts slacks `s` and violations `e` on the central path: both products are `μ`, and the distances
+/// `d` from the bounds are unchanged.
 ///
 /// ```text
 /// s − e = d,  μ / s + μ / e = linear
@@ -159,7 +161,7 @@ pub(in crate::ocp::nlp::ipm) fn start_on_central_path<T: Real>(
         let linear = at(inequalities.linear, j as u32).to_f64();
         let push = linear * distance;
         let root = Scalar::sqrt(4.0 * mu * mu + push * push);
-        // Of two numbers whose difference is the distance the larger one has no cancellation.
+        // The larger of two numbers with a given difference is computed without cancellation.
         let larger = (2.0 * mu + push.abs() + root) / (2.0 * linear);
         let smaller = mu / (linear - mu / larger);
         let (slack, violation) = if distance >= 0.0 { (larger, smaller) } else { (smaller, larger) };

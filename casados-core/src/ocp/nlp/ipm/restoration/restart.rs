@@ -1,4 +1,4 @@
-//! A second attempt, from a simulation with the controls of the guess.
+//! Restart from a simulation with the controls of the guess.
 
 use super::phase::exit_restoration;
 use crate::ocp::formulation::instance::Ocp;
@@ -16,11 +16,11 @@ use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
-    /// violations, for long: once, where a simulation with the controls of the guess violates
-    /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
-    /// astray, and violations that stay there say nothing of the problem. A run that ended
-    /// with the violations of the guess begins again at a simulation with controls beside its.
+    /// Restarts a run that failed or stalled, at most once, if a simulation with the controls of
+    /// the guess violates bounds by less than the iterate. With unstable dynamics the gaps may lead
+    /// to a stationary point of the violations that is no property of the problem. A run that ended
+    /// with the violations of the guess restarts from a simulation with perturbed controls. Returns
+    /// whether it restarts.
     pub(in crate::ocp::nlp::ipm) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -32,7 +32,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     {
         let stalls = final_status.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(final_status, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::LIFTED {
+        if !(failed || stalls) || !self.options.restart || state.second_attempt || ocp.problem.is_lifted() {
             return false;
         }
         let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
@@ -45,7 +45,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             Some(_) => current_violation,
             None => state.violation.max(current_violation),
         };
-        // Where nothing was gained from the guess it may be a maximum of violations.
+        // A guess whose violations did not decrease may be a maximum of them.
         let is_infeasible =
             matches!(final_status, Some(Status::Infeasible { .. })) && state.contradictory_bounds.is_none();
         let mut equals_guess_violation = false;

@@ -1,14 +1,14 @@
-//! Whether a problem is unbounded: a ray of points that satisfy all constraints, along which the
-//! objective falls without end.
+//! Test for unboundedness: a recession direction, a ray of feasible points along which the
+//! objective decreases without bound.
 //!
 //! ```text
 //! v(α) = v + α d        f(v(α)) falls with α,  no distance to a bound shrinks by more than ε α ‖d‖
 //! ```
 //!
-//! `d` is the step where variables have become very large, all sizes are in the units of rows, and
-//! the objective is that of the problem, not of a model. A distance that shrinks as fast as `α`
-//! grows would end the ray, however far the bound is. Where dynamics are not linear the states are
-//! those that follow from the controls of a point on the ray.
+//! `d` is the Newton step where variables are very large, in the units of rows. The test evaluates
+//! the objective of the problem, not its quadratic model. A distance from a bound that decreases in
+//! proportion to `α` ends the ray, however large it is. With nonlinear dynamics the states are
+//! simulated with the controls of the point on the ray.
 
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -19,17 +19,17 @@ use crate::ocp::nlp::ipm::line_search::LineSearch;
 use crate::ocp::nlp::ipm::run_state::RunState;
 use crate::qp::element::set;
 use crate::qp::interior::at;
-use crate::qp::{Places, StageDims, Store, part};
+use crate::qp::{StageDims, StageOffsetsIter, Store, part};
 use crate::scalar::Real;
 
-/// How far the ray is followed, in steps as long as the variables are large: up to where numbers
-/// end, or where a minimum that lies far away would show.
+/// The lengths of the tested points of the ray, relative to the size of the variables: up to the
+/// largest numbers, to detect a distant minimum.
 const RAY_LENGTHS: [f64; 10] = [1.0, 1e4, 1e8, 1e12, 1e16, 1e20, 1e24, 1e28, 1e32, 1e36];
-/// Where a ray is none, variables may become so many times as large before the next one is tried.
+/// After a failed test, the growth of the variables before the next test.
 const RAY_RETRY_GROWTH: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Whether variables are very large, and the step is a ray along which the problem has no end.
+    /// Whether variables are very large, and the step is a recession direction.
     pub(in crate::ocp::nlp::ipm) fn is_unbounded<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -67,7 +67,7 @@ where
     N: Store<T>,
     I: Store<u32>,
 {
-    /// Whether the objective falls along the ray of the step, and no constraint ends it.
+    /// Whether the objective decreases along the ray of the step, and no constraint ends the ray.
     fn is_recession_direction<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, tolerance: f64) -> bool {
         let objective_unit = self.dimensions.scaling.objective_unit;
         let Some([size, step]) = self.variable_and_step_sizes(ocp) else { return false };
@@ -91,11 +91,11 @@ where
         accepted_points > 0
     }
 
-    /// The largest variable and the largest step, in units; nothing where one is zero.
+    /// The largest variable and the largest step, in units; `None` if one is zero.
     fn variable_and_step_sizes<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>) -> Option<[f64; 2]> {
         let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
         let sizes = [&*iterate.v, &*iterate.step].map(|numbers| {
-            Places::<T>::new(iterate.qp.dims).fold(0.0, |largest: f64, place| {
+            StageOffsetsIter::<T>::new(iterate.qp.dims).fold(0.0, |largest: f64, place| {
                 let own = part(numbers, place.row, place.n).iter();
                 let units = part(self.workspace.units, place.row, place.n);
                 own.zip(units).fold(largest, |m, (&v, &unit)| m.max((v / unit).abs().to_f64()))
@@ -104,10 +104,10 @@ where
         sizes.iter().all(|size| size.is_normal()).then_some(sizes)
     }
 
-    /// The objective at a point of the ray, with the penalties of soft bounds: none where a
-    /// constraint ends the ray, not a number where a function has no value. Violations may be
-    /// `tolerance` times what the point has moved, and that at the iterate itself, where distances
-    /// are kept.
+    /// Returns the objective at a point of the ray, with the penalties of soft bounds: `None` if a
+    /// constraint ends the ray, NaN if a function is not finite. Violations may be `tolerance`
+    /// times the distance of the point from the iterate, and `tolerance` at the iterate, where the
+    /// distances from the bounds are stored.
     fn objective_on_ray<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -119,10 +119,10 @@ where
             .row_values_at(self.trial_point, self.workspace.interval_ends, self.workspace.row_values)
             .unwrap_or(f64::NAN);
         let mut gaps = ocp.gap_sum_at(self.trial_point, self.workspace.interval_ends, self.workspace.units);
-        if P::LIFTED {
+        if ocp.problem.is_lifted() {
             gaps += ocp.stage_residuals[0].to_f64();
         } else if gaps > self.violation_limit(ocp, alpha, tolerance) {
-            // States that follow from the controls.
+            // Simulates the states with the controls.
             if !ocp.close_gaps_by_simulation(
                 self.trial_point,
                 self.workspace.interval_ends,
@@ -144,13 +144,13 @@ where
         (gaps + violation <= limit).then_some(objective + penalties)
     }
 
-    /// By how much the trial point may violate constraints.
+    /// The largest acceptable violation of the trial point.
     fn violation_limit<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, alpha: f64, tolerance: f64) -> f64 {
         if alpha == 0.0 {
             return tolerance;
         }
         let points = [&ocp.iterate, &*self.trial_point].map(|point| point.variables_and_costates().0);
-        let moved = Places::<T>::new(ocp.qp().dims).fold(0.0, |largest: f64, place| {
+        let moved = StageOffsetsIter::<T>::new(ocp.qp().dims).fold(0.0, |largest: f64, place| {
             let [from, to] = points.map(|v| part(v, place.v, place.n));
             let pairs = from.iter().zip(to).zip(part(self.workspace.units, place.row, place.n));
             pairs.fold(largest, |m, ((&from, &to), &unit)| m.max(((to - from) / unit).abs().to_f64()))
@@ -158,8 +158,9 @@ where
         tolerance * moved
     }
 
-    /// By how much distances to hard bounds have shrunk at the trial point, or are violated at the
-    /// `first` one, and residuals of equations, in units; what violations of soft bounds cost.
+    /// Returns the decrease of the distances from hard bounds since the ray's origin (at the origin
+    /// itself: the violations) plus the residuals of equations, in units; and the penalties of soft
+    /// bounds.
     fn distance_decrease_and_penalties<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -174,7 +175,7 @@ where
             coupling.evaluate(iterate.qp, rows);
             sum += coupling.residual_sum();
         }
-        let (inequalities, infinity) = (&iterate.sides, T::from_f64(f64::INFINITY));
+        let (inequalities, infinity) = (&iterate.inequalities, T::from_f64(f64::INFINITY));
         let residual = |row: u32, bound: T| at(rows, row) - bound;
         for (&row, &bound) in inequalities.equations.iter().zip(&*inequalities.equation_bound) {
             sum += (residual(row, bound) / at(units, row)).abs().to_f64();
