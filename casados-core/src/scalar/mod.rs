@@ -263,8 +263,6 @@ pub trait Packed<T>: Lanes {
     fn minus_product(self, a: Self, b: Self) -> Self;
     /// The sum of the lanes.
     fn total(self) -> T;
-    /// The sums of the lanes of each register, one per lane; there are as many registers as lanes.
-    fn totals(all: &[Self]) -> Self;
     /// The largest lane; any lane if one is NaN.
     fn largest(self) -> T;
 }
@@ -274,10 +272,6 @@ pub trait Packed<T>: Lanes {
 pub trait Registers<T> {
     /// Implementations are `#[inline(always)]`, with everything that they call.
     fn run<E: Packed<T>>(self);
-    /// Returns the number of useful lanes: half of a register of twice as many would be padding.
-    fn lanes(&self) -> usize {
-        usize::MAX
-    }
 }
 
 /// A computation with any register of numbers of type `T`.

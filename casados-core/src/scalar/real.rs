@@ -155,10 +155,6 @@ macro_rules! real {
                 self
             }
             #[inline(always)]
-            fn totals(all: &[$t]) -> $t {
-                all.first().copied().unwrap_or(0.0)
-            }
-            #[inline(always)]
             fn largest(self) -> $t {
                 self
             }

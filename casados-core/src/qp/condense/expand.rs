@@ -74,11 +74,11 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
         let Self { qp, block, solution: SolutionView { v, dynamics, lower, upper, .. }, minus, g } = self;
         let inside = |stage: usize| !stage.is_multiple_of(block) && stage + 1 < qp.dims.len();
         for place in StageOffsetsIter::<T>::new(qp.dims).filter(|place| inside(place.stage + 1)) {
-            let StageOffsets { n, ld, next, ld_next, .. } = place;
+            let StageOffsets { n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let (here, coming) = v.split_at_mut_checked(place.v + ld).unwrap_or_default();
-            let coming = part_mut(coming, 0, ld_next);
-            copy_common(part_mut(coming, 0, next), part(data, place.offset(), next));
+            let coming = part_mut(coming, 0, next);
+            copy_common(coming, part(data, place.offset(), next));
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             add_transposed::<T, E>(coming, matrix, part(here, place.v, ld), n, next);
         }

@@ -2,23 +2,25 @@
 //!
 //! With pivots of either sign, `M_uu = L S Lᵀ`, where the reciprocals of pivots have the signs `S`.
 
-use super::kernels::{Columns, Part, Source, chunk, product, splat, subtract, subtract_column};
-use crate::qp::element::set;
+use super::kernels::{Columns, Part, Source, product, splat, subtract, subtract_column};
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Real};
 
 /// The number of columns processed together, with their triangle in registers.
 const GROUP: usize = 4;
 
-/// Returns `W` rows of `W` columns of a panel, from a row on, by reference.
+/// Returns the lower triangle of `W` columns of a panel, from a row on.
 #[inline(always)]
-#[allow(unsafe_code)]
-pub fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Option<[&[T; W]; W]> {
-    if panel.len() < row + (W - 1) * ld + W {
-        return None;
+fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Option<[[T; W]; W]> {
+    let mut block = [[T::ZERO; W]; W];
+    let mut rest = panel.get(row..)?;
+    for (i, column) in block.iter_mut().enumerate() {
+        *column = *rest.first_chunk::<W>()?;
+        if i + 1 < W {
+            rest = rest.get(ld..)?;
+        }
     }
-    // SAFETY: `i ≤ W − 1`, and the panel is as long as the last of these chunks needs.
-    Some(core::array::from_fn(|i| unsafe { chunk::<_, W>(panel, row + i * ld) }))
+    Some(block)
 }
 
 /// Computes `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of
@@ -252,62 +254,10 @@ fn factor_columns<T: Real, E: Packed<T>>(
     all
 }
 
-/// Eliminates pivot `I` of a block of `W`. `inverse` has the diagonal before elimination, and the
-/// reciprocal of the pivot afterwards.
-#[inline(always)]
-fn eliminate_pivot<T: Real, const W: usize, const I: usize>(
-    block: &mut [[T; W]; W],
-    noise: T,
-    pivots: &mut Pivots<'_, T>,
-    found: &mut PivotReport<T>,
-) {
-    let (Some(&column), Some(&mut before)) = (block.get(I), pivots.inverse.get_mut(I)) else { return };
-    let mut pivot = column.get(I).copied().unwrap_or(T::ZERO);
-    // NaN is not positive.
-    let is_positive = pivot > noise * before;
-    if !is_positive {
-        pivot = other_pivot(I, (pivot, before), pivots, found);
-    }
-    // The next pivot depends on this quotient, not on a square root.
-    let inverse = T::ONE / pivot;
-    set(pivots.inverse, I, inverse);
-    for j in I + 1..W {
-        let factor = column[j] * inverse;
-        for i in j..W {
-            block[j][i] = block[j][i] - factor * column[i];
-        }
-    }
-}
-
-/// Returns the replacement of a pivot that is not positive; `before` is the diagonal before
-/// elimination. A negative pivot stays if `indefinite`, otherwise it becomes a large number.
-#[cold]
-#[inline(never)]
-fn other_pivot<T: Real>(
-    index: usize,
-    (pivot, before): (T, T),
-    pivots: &mut Pivots<'_, T>,
-    found: &mut PivotReport<T>,
-) -> T {
-    let small = T::from_f64(T::EPSILON).sqrt() * before.abs();
-    if pivots.indefinite && pivot < -small {
-        found.signed = true;
-        return pivot;
-    }
-    if (pivot < T::ZERO || pivots.indefinite) && found.negative.is_none() {
-        found.negative = Some((index, pivot));
-    }
-    let replaced = if pivots.largest > T::ZERO { pivots.largest } else { T::ONE };
-    set(pivots.added, index, replaced - pivot);
-    found.regularised += 1;
-    replaced
-}
-
 /// Factorises `W` columns of a panel after earlier columns were subtracted: their diagonal block
 /// starts at row `first`. The block is factorised first, then all rows are multiplied by its `L⁻ᵀ`
 /// in registers. `inverse` has the diagonal before elimination.
 #[inline(always)]
-#[allow(unsafe_code)]
 fn factor_group<T: Real, E: Packed<T>, const W: usize>(
     (group, ld, first): (&mut [T], usize, usize),
     rows: usize,
@@ -315,55 +265,58 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
     Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
 ) -> PivotReport<T> {
     let mut found = PivotReport { regularised: 0, negative: None, signed: false };
-    let Some(columns) = triangle::<T, W>(group, ld, first) else { return found };
-    let mut block = [[T::ZERO; W]; W];
-    for j in 0..W {
-        for i in j..W {
-            block[j][i] = columns[j][i];
+    let (Some(inverse), Some(added)) = (inverse.first_chunk_mut::<W>(), added.first_chunk_mut::<W>()) else {
+        return found;
+    };
+    let Some(mut block) = triangle::<T, W>(group, ld, first) else { return found };
+    for i in 0..W {
+        let mut pivot = block[i][i];
+        added[i] = T::ZERO;
+        let is_positive = pivot > noise * inverse[i];
+        let small = T::from_f64(T::EPSILON).sqrt() * inverse[i].abs();
+        let is_negative = indefinite && pivot < -small;
+        if !is_positive && !is_negative {
+            if (pivot < T::ZERO || indefinite) && found.negative.is_none() {
+                found.negative = Some((i, pivot));
+            }
+            let replaced = if largest > T::ZERO { largest } else { T::ONE };
+            added[i] = replaced - pivot;
+            pivot = replaced;
+            found.regularised += 1;
         }
-    }
-    if let Some(added) = added.first_chunk_mut::<W>() {
-        *added = [T::ZERO; W];
-    }
-    let mut pivots = Pivots { inverse, added, largest, indefinite };
-    // Straight-line code keeps the block in registers.
-    eliminate_pivot::<T, W, 0>(&mut block, noise, &mut pivots, &mut found);
-    if W > 1 {
-        eliminate_pivot::<T, W, 1>(&mut block, noise, &mut pivots, &mut found);
-    }
-    if W > 2 {
-        eliminate_pivot::<T, W, 2>(&mut block, noise, &mut pivots, &mut found);
-    }
-    if W > 3 {
-        eliminate_pivot::<T, W, 3>(&mut block, noise, &mut pivots, &mut found);
-    }
-    let Some(inverse) = pivots.inverse.first_chunk_mut::<W>() else { return found };
-    for j in 0..W {
-        let size = inverse[j].abs().sqrt();
-        inverse[j] = if inverse[j] < T::ZERO { -size } else { size };
-        for i in j + 1..W {
-            block[j][i] = block[j][i] * size;
+        let size = T::ONE / pivot.abs().sqrt();
+        inverse[i] = if is_negative { -size } else { size };
+        found.signed |= is_negative;
+        for l in block[i].iter_mut().skip(i + 1) {
+            *l = *l * size;
         }
-    }
-    let mut sizes = *inverse;
-    if found.signed {
-        // The subtracted rows have the signs of pivots.
-        for (column, size) in block.iter_mut().zip(&mut sizes) {
-            if *size < T::ZERO {
-                *column = column.map(|l| -l);
-                *size = -*size;
+        let column = block[i];
+        for (j, (other, &own)) in block.iter_mut().zip(&column).enumerate().skip(i + 1) {
+            let factor = if is_negative { -own } else { own };
+            for (element, &l) in other.iter_mut().zip(&column).skip(j) {
+                *element = *element - factor * l;
             }
         }
     }
-    let (cells, ld, rows) = (E::cells_mut(group), ld / E::LANES, rows.div_ceil(E::LANES));
-    if cells.len() < (W - 1) * ld + rows {
-        return found;
+    // The subtracted rows have the signs of pivots.
+    let mut sizes = *inverse;
+    for (column, size) in block.iter_mut().zip(&mut sizes) {
+        if *size < T::ZERO {
+            *column = column.map(|l| -l);
+            *size = -*size;
+        }
     }
-    for r in 0..rows {
+    let mut columns: [&mut [E::Cell]; W] = core::array::from_fn(|_| Default::default());
+    let mut rest = group;
+    for column in &mut columns {
+        let (here, others) = rest.split_at_mut_checked(ld).unwrap_or_default();
+        *column = E::cells_mut(here);
+        rest = others;
+    }
+    for r in 0..rows.div_ceil(E::LANES) {
         let mut values = [E::from_f64(0.0); W];
-        for (j, value) in values.iter_mut().enumerate() {
-            // SAFETY: `j ≤ W − 1` and `r < rows`.
-            let [cell] = unsafe { chunk::<_, 1>(cells, j * ld + r) };
+        for (value, column) in values.iter_mut().zip(&columns) {
+            let Some(cell) = column.get(r) else { return found };
             *value = E::load(cell);
         }
         for j in 0..W {
@@ -372,8 +325,8 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
             }
             values[j] = values[j] * splat::<T, E>(sizes[j]);
         }
-        for (j, value) in values.iter().enumerate() {
-            if let Some(cell) = cells.get_mut(j * ld + r) {
+        for (value, column) in values.iter().zip(&mut columns) {
+            if let Some(cell) = column.get_mut(r) {
                 value.store(cell);
             }
         }

@@ -1,5 +1,6 @@
 //! An iterate of the interior point, and its residuals.
 
+use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
 use super::riccati::{Extent, InitialStateKind, Riccati};
@@ -273,7 +274,12 @@ impl<'a, T: Real> Iterate<'a, T> {
                 largest.add_forces::<E>(pi, here);
             } else if place.stage > 0 {
                 // `π` is the gradient after elimination of the controls, `g` the remainder.
-                let left = self.riccati.eliminate_controls::<E>(&place, g);
+                let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
+                let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
+                let y = part_mut(self.riccati.y, place.v + nx, place.nu);
+                let left = part_mut(self.riccati.g, 0, ld);
+                copy_common(left, g);
+                eliminate::<T, E>(left, panel, ld, inverse, y, nx);
                 let before = place.dynamics.saturating_sub(padded_len::<T>(nx));
                 let pi = part_mut(multipliers, before, nx);
                 copy_common(pi, left);
@@ -311,16 +317,16 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut largest = LargestTerms::NONE;
         let mut rest = &mut *self.v;
         for place in StageOffsetsIter::<T>::new(self.qp.dims) {
-            let StageOffsets { n, ng, ld, next, ld_next, .. } = place;
+            let StageOffsets { n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let (v, general) = take_mut(&mut rest, place.rows).split_at_mut_checked(ld).unwrap_or_default();
-            let here = units.from(place.row);
+            let (general, here) = (part_mut(general, 0, ng), units.from(place.row));
             general.fill(T::ZERO);
             add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
             largest.add_values::<E>(v, here);
-            largest.add_values::<E>(part(general, 0, ng), units.from(place.row + ld));
-            let dynamics = part_mut(self.dynamics, place.dynamics, ld_next);
+            largest.add_values::<E>(general, units.from(place.row + ld));
+            let dynamics = part_mut(self.dynamics, place.dynamics, next);
             let offset = part(data, place.offset(), next);
             largest.add_values::<E>(offset, units.from(place.row + place.rows));
             for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
@@ -339,8 +345,8 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Evaluates the residuals of the sides from the values of the rows.
     #[inline(always)]
     pub fn evaluate_side_residuals<E: Packed<T>>(&mut self) {
-        self.evaluate_distances();
         let sides = &mut self.inequalities;
+        sides.evaluate_sides(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
         {
             *residual = value - slack;

@@ -6,7 +6,6 @@ mod border;
 mod cholesky;
 mod coupling;
 mod curvature;
-mod gains;
 mod iterate;
 mod kernels;
 mod limits;
@@ -228,13 +227,10 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let counts = count(qp, &reading);
         let extent = Extent::of::<T>(qp.dims);
         let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
-        let numbers = self.numbers.at_least(length, QpField::Numbers)?;
+        let mut numbers = self.numbers.at_least(length, QpField::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
-        // Arrays of inequalities have any length: they follow the arrays of whole registers.
-        let (mut numbers, mut inequality_numbers) =
-            numbers.split_at_mut_checked(length - counts.memory_len()).unwrap_or_default();
-        let mut sides = Inequalities::new(counts, &mut inequality_numbers, &mut indices);
+        let mut sides = Inequalities::new(counts, &mut numbers, &mut indices);
         sides.list(qp, &reading);
         let given = attempt.penalties == PenaltyMode::Given;
         let rows = take_mut(&mut numbers, extent.end.row);
@@ -256,7 +252,6 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             limits,
             over,
             attempt,
-            variables: extent.n,
             solution,
             result,
             infeasible,

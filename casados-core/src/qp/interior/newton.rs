@@ -89,12 +89,6 @@ impl<T: Real> Iterate<'_, T> {
         self.inequalities.evaluate_sides(self.step, |value, _| value, |value, _| -value);
     }
 
-    /// Computes the distances from the bounds in `scratch`.
-    #[inline(always)]
-    pub fn evaluate_distances(&mut self) {
-        self.inequalities.evaluate_sides(self.v, |value, bound| value - bound, |value, bound| bound - value);
-    }
-
     /// Takes the fraction `primal` of the step, and `dual` of the step of the multipliers of the
     /// sides. Residuals are unchanged.
     pub fn step_point(&mut self, primal: T, dual: T) {

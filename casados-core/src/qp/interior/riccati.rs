@@ -10,22 +10,15 @@
 //! this classical form takes fewer operations than the square-root form.
 
 use super::cholesky::{eliminate, substitute};
-use super::kernels::{
-    Columns, PADDING_COLUMNS, Source, add_feedback, add_transposed, copy, difference, subtract_from,
-    sum_transposed,
-};
+use super::kernels::{Columns, PADDING_COLUMNS, add, add_transposed, copy, copy_negative, subtract};
 use super::shared::Shared;
 use crate::qp::error::QpError;
 use crate::qp::layout::{
     StageDims, StageOffsets, StageOffsetsIter, copy_common, end, padded_len, part, part_mut, take_mut,
 };
 use crate::qp::problem::QpView;
-use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
-
-/// Whether gains are stored beside the factors.
-pub const GAINS: bool = REGISTERS;
 
 /// How the first state is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,20 +41,17 @@ pub struct Riccati<'a, T> {
     pub p: &'a mut [T],
     /// `(K; L)` of all stages, then the factor of `P` at the start.
     pub panels: &'a mut [T],
-    /// `M_xu M_uu⁻¹` of all stages.
-    pub gains: &'a mut [T],
     /// Reciprocals of pivots.
     pub inverse: &'a mut [T],
     /// Increases of pivots.
     pub added: &'a mut [T],
-    /// `L⁻¹ g_u` in the backward pass, `−M_uu⁻¹ g_u` in the forward pass.
+    /// `L⁻¹ g_u`
     pub y: &'a mut [T],
     /// `−P₊ r`
     offset: &'a mut [T],
     /// The gradient of the current stage.
     pub g: &'a mut [T],
-    /// `p` in the backward pass, then `−(p₊ + P₊ r)`, and the negative gradient of general
-    /// constraints.
+    /// `−(p₊ + P₊ r)`, and the negative gradient of general constraints.
     pub minus: &'a mut [T],
     /// The number of increased pivots.
     pub regularised: usize,
@@ -116,8 +106,7 @@ impl<'a, T: Real> Riccati<'a, T> {
         let matrices = ld * (n + PADDING_COLUMNS)
             + ld * (next_and_ng + PADDING_COLUMNS)
             + padded_len::<T>(nx) * (nx + PADDING_COLUMNS);
-        let factors = if GAINS { 2 * end.factor } else { end.factor };
-        matrices + factors + 3 * end.v + end.dynamics + ld + padded_len::<T>(next_and_ng)
+        matrices + end.factor + 3 * end.v + end.dynamics + ld + padded_len::<T>(next_and_ng)
     }
     /// A recursion in memory that is zero.
     pub fn new(extent: &Extent, memory: &mut &'a mut [T]) -> Self {
@@ -127,7 +116,6 @@ impl<'a, T: Real> Riccati<'a, T> {
             w: take_mut(memory, ld * (next_and_ng + PADDING_COLUMNS)),
             p: take_mut(memory, padded_len::<T>(nx) * (nx + PADDING_COLUMNS)),
             panels: take_mut(memory, end.factor),
-            gains: take_mut(memory, if GAINS { end.factor } else { 0 }),
             inverse: take_mut(memory, end.v),
             added: take_mut(memory, end.v),
             y: take_mut(memory, end.v),
@@ -225,11 +213,11 @@ impl<T: Real> Riccati<'_, T> {
             // `−(p₊ + P₊ r)`, empty at the end of the horizon; then the general constraints.
             let offset = part_mut(self.offset, place.dynamics, ld_next);
             if factor {
+                offset.fill(T::ZERO);
                 let p = Columns { data: &*self.p, ld: ld_next };
-                let size = (next, next);
-                difference::<T, E>(offset, Source::Zero, p, part(dynamics, place.dynamics, next), size);
+                subtract::<T, E>(offset, p, part(dynamics, place.dynamics, next), next, next);
             }
-            subtract_from::<T, E>(self.minus, offset);
+            add::<T, E>(self.minus, offset);
             let general = part(gradient, place.row + ld, ng);
             for (minus, &general) in part_mut(self.minus, next, ng).iter_mut().zip(general) {
                 *minus = -general;
@@ -238,17 +226,11 @@ impl<T: Real> Riccati<'_, T> {
                 self.factor_stage::<E>(&place, equations, scratch, shared)?;
             }
             let g = part_mut(self.g, 0, ld);
-            let own = Source::Matrix(Columns { data: part(gradient, place.row, ld), ld });
-            difference::<T, E>(g, own, matrix, self.minus, (n, next + ng));
+            copy::<T, E>(g, part(gradient, place.row, ld));
+            subtract::<T, E>(g, matrix, self.minus, n, next + ng);
             let panel = part(self.panels, place.factor, ld * place.pivots);
             let inverse = part(self.inverse, place.v, ld);
             let y = part_mut(self.y, place.v, ld);
-            let p = part_mut(self.minus, 0, padded_len::<T>(nx));
-            if const { GAINS } {
-                let gains = Columns { data: part(self.gains, place.factor, ld * nu), ld };
-                let own = Source::Matrix(Columns { data: &*g, ld });
-                difference::<T, E>(p, own, gains, part(g, nx, nu), (nx, nu));
-            }
             eliminate::<T, E>(g, panel, ld, part(inverse, nx, nu), part_mut(y, nx, nu), nx);
             if place.stage == 0 {
                 if first == InitialStateKind::Free {
@@ -257,9 +239,7 @@ impl<T: Real> Riccati<'_, T> {
                 }
                 break;
             }
-            if const { !GAINS } {
-                copy::<T, E>(p, g);
-            }
+            copy_negative::<T, E>(part_mut(self.minus, 0, padded_len::<T>(nx)), g);
         }
         Ok(())
     }
@@ -267,12 +247,9 @@ impl<T: Real> Riccati<'_, T> {
     #[inline(always)]
     pub fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
         let Equations { qp, first, dynamics, .. } = *equations;
-        if const { GAINS } {
-            self.substitute_controls(qp);
-        }
         let mut rest = step;
         for place in StageOffsetsIter::<T>::new(qp.dims) {
-            let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
+            let StageOffsets { nx, nu, n, ng, ld, next, .. } = place;
             let here = take_mut(&mut rest, place.rows);
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
             let panel = part(self.panels, place.factor, ld * place.pivots);
@@ -289,39 +266,18 @@ impl<T: Real> Riccati<'_, T> {
                     substitute(part_mut(v, 0, nx), panel, ld, 0, part(inverse, 0, nx));
                 }
             }
-            if const { GAINS } {
-                let gains = Columns { data: part(self.gains, place.factor, ld * nu), ld };
-                add_feedback::<T, E>(v, gains, y, [nx, nu]);
-            } else {
-                part_mut(v, nx, nu).fill(T::ZERO);
-                let u = part_mut(self.g, 0, nu);
-                copy_common(u, part(y, nx, nu));
-                add_transposed::<T, E>(u, Columns { data: panel, ld }, v, nx, nu);
-                substitute(u, panel, ld, nx, part(inverse, nx, nu));
-                copy_common(part_mut(v, nx, nu), u);
-            }
-            let coming = part_mut(rest, 0, ld_next);
-            let offset = part(dynamics, place.dynamics, ld_next);
-            if const { GAINS } {
-                let offset = Source::Matrix(Columns { data: offset, ld: ld_next });
-                sum_transposed::<T, E>(coming, offset, matrix, v, (n, next));
-                sum_transposed::<T, E>(general, Source::Zero, matrix.skip(next), v, (n, ng));
-                continue;
-            }
-            copy::<T, E>(coming, offset);
+            part_mut(v, nx, nu).fill(T::ZERO);
+            let u = part_mut(self.g, 0, nu);
+            copy_common(u, part(y, nx, nu));
+            add_transposed::<T, E>(u, Columns { data: panel, ld }, v, nx, nu);
+            substitute(u, panel, ld, nx, part(inverse, nx, nu));
+            copy_common(part_mut(v, nx, nu), u);
+            let coming = part_mut(rest, 0, next);
+            copy_common(coming, part(dynamics, place.dynamics, next));
             add_transposed::<T, E>(coming, matrix, v, n, next);
+            let general = part_mut(general, 0, ng);
             general.fill(T::ZERO);
             add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
-        }
-    }
-
-    /// Computes the controls `−M_uu⁻¹ g_u` at a zero state for all stages, before the forward pass
-    /// and outside its chain of dependent operations.
-    #[inline(always)]
-    fn substitute_controls(&mut self, qp: QpView<'_, T>) {
-        for StageOffsets { v, nx, nu, ld, factor, .. } in StageOffsetsIter::<T>::new(qp.dims) {
-            let panel = part(self.panels, factor, ld * nu);
-            substitute(part_mut(self.y, v + nx, nu), panel, ld, nx, part(self.inverse, v + nx, nu));
         }
     }
 }

@@ -45,8 +45,6 @@ pub struct Run<'r, 'a, 's, T> {
     /// Returns whether the time limit is reached.
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
-    /// The maximum number of variables of a stage.
-    pub variables: usize,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<QpStatistics, QpError>,
     /// Whether the multipliers are a certificate of infeasibility; with the objective, whether they
@@ -60,13 +58,9 @@ compiled! {
 }
 
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
-    // Wider registers would also compute padding.
-    fn lanes(&self) -> usize {
-        self.variables
-    }
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible, .. } = self;
+        let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible } = self;
         let warm = [&*solution.v, solution.lower, solution.upper];
         if attempt.start == QpStart::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
             attempt.start = QpStart::Cold;

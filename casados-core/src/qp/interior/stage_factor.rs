@@ -1,9 +1,10 @@
 //! The factorisation of a stage.
 
 use super::cholesky::{Pivots, cholesky};
-use super::kernels::{Columns, Part, Source, add_rows, copy, mirror, product};
-use super::riccati::{Equations, GAINS, InitialStateKind, Riccati};
+use super::kernels::{Columns, Part, Source, copy, mirror, product};
+use super::riccati::{Equations, InitialStateKind, Riccati};
 use super::shared::Shared;
+use crate::qp::element::add;
 use crate::qp::error::QpError;
 use crate::qp::layout::{StageOffsets, padded_len, part, part_mut};
 use crate::scalar::{Packed, Real};
@@ -38,9 +39,6 @@ impl<T: Real> Riccati<'_, T> {
             }
             Some(found) => self.verify(qp, place, found, scratch)?,
             None => {}
-        }
-        if const { GAINS } {
-            self.write_gains::<E>(place);
         }
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
         let (before, _) = self.m.split_at_checked(nx * ld).unwrap_or_default();
@@ -114,11 +112,20 @@ impl<T: Real> Riccati<'_, T> {
         product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);
         // The Hessian has its lower triangle only; the mixed block is controls times states.
         let mixed = part_mut(self.m, nx * ld, nu * ld);
-        add_rows::<T, E>(mixed, hessian.get(nx..).unwrap_or_default(), ld, [nu, nx]);
-        let mut largest = self.largest;
-        for (diagonal, &weight) in self.m.iter_mut().step_by(ld + 1).zip(part(weights, 0, n)) {
-            *diagonal = *diagonal + weight;
-            largest = diagonal.abs().max(largest);
+        for (i, row) in hessian.chunks(ld.max(1)).take(nx).enumerate() {
+            let mut index = i;
+            for &s in part(row, nx, nu) {
+                add(mixed, index, s);
+                index += ld;
+            }
+        }
+        let (mut largest, mut rest) = (self.largest, &mut *self.m);
+        for &weight in part(weights, 0, n) {
+            if let Some(diagonal) = rest.first_mut() {
+                *diagonal = *diagonal + weight;
+                largest = diagonal.abs().max(largest);
+            }
+            rest = rest.get_mut(ld + 1..).unwrap_or_default();
         }
         self.largest = largest;
     }

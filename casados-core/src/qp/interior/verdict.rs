@@ -46,19 +46,11 @@ impl<T: Real> Iterate<'_, T> {
         for &side in &*sides.soft {
             set(sides.multiplier, side as usize, T::ZERO);
         }
-        // `weights` holds the gradient with the objective until the next step computes weights.
-        // The residuals of dynamics and bounds are already evaluated.
-        copy_common(self.weights, self.stationarity);
-        let (objective, terms, own_terms) = (self.objective, self.terms, self.own_terms);
-        self.objective = false;
-        self.evaluate_gradient::<E>(multipliers);
-        self.evaluate_distances();
+        let objective = core::mem::replace(&mut self.objective, false);
         let suspicious = self.is_certificate::<E>(T::from_f64(SUSPICION_FACTOR), multipliers);
-        (self.objective, self.terms, self.own_terms) = (objective, terms, own_terms);
-        copy_common(self.stationarity, self.weights);
+        self.objective = objective;
         copy_common(self.inequalities.multiplier, self.inequalities.multiplier_step);
-        if !suspicious && self.coupling.is_some() {
-            // Multipliers of couplings are the residual of the gradient without the objective.
+        if !suspicious {
             let _ = self.evaluate::<E>(multipliers);
         }
         suspicious
@@ -82,17 +74,17 @@ impl<T: Real> Iterate<'_, T> {
     /// of 1e5 (100 in single precision).
     #[inline(always)]
     pub fn proves_infeasibility<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
-        let _ = self.evaluate::<E>(multipliers);
         self.is_certificate::<E>(
             T::from_f64(if T::EPSILON < DOUBLE_PRECISION_EPSILON { 1e5 } else { 1e2 }),
             multipliers,
         )
     }
 
-    /// The same test for an evaluated iterate, for points up to `size_factor` times as large.
+    /// The same test for points up to `far` times as large as the iterate.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline(never))]
-    fn is_certificate<E: Packed<T>>(&self, size_factor: T, multipliers: &[T]) -> bool {
+    fn is_certificate<E: Packed<T>>(&mut self, size_factor: T, multipliers: &mut [T]) -> bool {
+        let _ = self.evaluate::<E>(multipliers);
         let count = self.inequalities.counts.sides();
         let (forces, distances) =
             (part(self.inequalities.multiplier, 0, count), part(self.inequalities.scratch, 0, count));

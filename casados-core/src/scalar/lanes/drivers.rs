@@ -28,21 +28,6 @@ pub(super) fn transpose_in_memory<T: Copy + Default, R: Copy, const W: usize>(
     rows
 }
 
-/// Computes the sum of the lanes of each register by transposition.
-macro_rules! totals_of_columns {
-    () => {
-        #[inline(always)]
-        pub fn totals(rows: [Register; WIDTH]) -> Register {
-            let mut sum = splat(0.0);
-            for column in transpose(rows) {
-                sum = add(sum, column);
-            }
-            sum
-        }
-    };
-}
-pub(super) use totals_of_columns;
-
 /// Runs a computation on `S` numbers in the narrowest register that holds them.
 macro_rules! side_by_side {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
@@ -124,13 +109,16 @@ macro_rules! packed_registers {
             #[cfg(target_arch = "x86_64")]
             if const { $most <= 8 && lanes::may_be_available(lanes::Level::Avx512) }
                 && lanes::level() == lanes::Level::Avx512
-                && computation.lanes() > $more
             {
                 type Register = lanes::$avx512<$most>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
             #[cfg(target_arch = "x86_64")]
-            if const { lanes::AVX2 } && lanes::level() >= lanes::Level::Avx2 {
+            if const {
+                lanes::may_be_available(lanes::Level::Avx2)
+                    || $most > 8 && lanes::may_be_available(lanes::Level::Avx512)
+            } && lanes::level() >= lanes::Level::Avx2
+            {
                 type Register = lanes::$avx2<$more>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }

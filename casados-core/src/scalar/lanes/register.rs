@@ -219,14 +219,6 @@ macro_rules! register {
                 $ops::total(self.0)
             }
             #[inline(always)]
-            fn totals(all: &[Self]) -> Self {
-                let mut rows = [$ops::splat(0.0); $ops::WIDTH];
-                for (row, from) in rows.iter_mut().zip(all) {
-                    *row = from.0;
-                }
-                Self($ops::totals(rows))
-            }
-            #[inline(always)]
             fn largest(self) -> $element {
                 $ops::largest(self.0)
             }

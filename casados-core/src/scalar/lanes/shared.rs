@@ -46,7 +46,6 @@ macro_rules! through_memory {
         pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
             super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)
         }
-        super::super::totals_of_columns!();
         /// Calls `F`; not inlined.
         #[inline(never)]
         pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {

@@ -158,9 +158,6 @@ pub mod sse2_f64 {
         /// Rounded twice.
         mul_add(a: Register, b: Register, c: Register) -> Register { _mm_add_pd(_mm_mul_pd(a, b), c) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm_sub_pd(c, _mm_mul_pd(a, b)) }
-        totals(rows: [Register; 2]) -> Register {
-            _mm_add_pd(_mm_unpacklo_pd(rows[0], rows[1]), _mm_unpackhi_pd(rows[0], rows[1]))
-        }
         mask_not(a: Mask) -> Mask { _mm_xor_pd(a, _mm_castsi128_pd(_mm_set1_epi64x(-1))) }
         select(m: Mask, a: Register, b: Register) -> Register { _mm_or_pd(_mm_and_pd(m, a), _mm_andnot_pd(m, b)) }
         bits(m: Mask) -> u32 { _mm_movemask_pd(m) as u32 }
@@ -200,14 +197,6 @@ pub mod sse_f32 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm_or_ps;
     }
     define! {
-        totals(rows: [Register; 4]) -> Register {{
-            let [a, b, c, d] = rows;
-            let (low, high) = (
-                _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b)),
-                _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d)),
-            );
-            _mm_add_ps(_mm_movelh_ps(low, high), _mm_movehl_ps(high, low))
-        }}
         total(a: Register) -> f32 {{
             let pairs = _mm_add_ps(a, _mm_movehl_ps(a, a));
             _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps::<1>(pairs, pairs)))
@@ -268,13 +257,6 @@ pub mod avx2_f64 {
                 _mm256_permute2f128_pd::<0x31>(odd[0], odd[1]),
             ]
         }}
-        totals(rows: [Register; 4]) -> Register {{
-            let (low, high) = (_mm256_hadd_pd(rows[0], rows[1]), _mm256_hadd_pd(rows[2], rows[3]));
-            _mm256_add_pd(
-                _mm256_permute2f128_pd::<0x20>(low, high),
-                _mm256_permute2f128_pd::<0x31>(low, high),
-            )
-        }}
         low_halves(a: Register, b: Register) -> Register { _mm256_permute2f128_pd::<0x20>(a, b) }
         high_halves(a: Register, b: Register) -> Register { _mm256_permute2f128_pd::<0x31>(a, b) }
         swap_halves(a: Register) -> Register { _mm256_permute2f128_pd::<1>(a, a) }
@@ -324,15 +306,6 @@ pub mod avx2_f32 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_ps;
     }
     define! {
-        totals(rows: [Register; 8]) -> Register {{
-            let [a, b, c, d, e, f, g, h] = rows;
-            let low = _mm256_hadd_ps(_mm256_hadd_ps(a, b), _mm256_hadd_ps(c, d));
-            let high = _mm256_hadd_ps(_mm256_hadd_ps(e, f), _mm256_hadd_ps(g, h));
-            _mm256_add_ps(
-                _mm256_permute2f128_ps::<0x20>(low, high),
-                _mm256_permute2f128_ps::<0x31>(low, high),
-            )
-        }}
         swap_halves(a: Register) -> Register { _mm256_permute2f128_ps::<1>(a, a) }
         signs_below() -> Register { _mm256_setr_ps(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_ps(a, b, c) }

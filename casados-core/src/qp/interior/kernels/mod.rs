@@ -4,13 +4,13 @@
 //! inlined into the function compiled for `E`. Firmware is compiled for its own processor, and has
 //! one copy of each kernel: code size matters more than calls.
 
-mod dots;
 mod product;
 mod vectors;
 
-pub use dots::{add_feedback, add_transposed, lanes, sum_transposed, symmetric};
-pub use product::{PADDING_COLUMNS, Part, Source, difference, product, subtract};
-pub use vectors::{add_rows, add_symmetric, copy, mirror, scale, subtract_column, subtract_from};
+pub use product::{PADDING_COLUMNS, Part, Source, product, subtract};
+pub use vectors::{
+    add, add_symmetric, add_transposed, copy, copy_negative, mirror, scale, subtract_column, symmetric,
+};
 
 use crate::scalar::{Packed, Real};
 
@@ -36,36 +36,10 @@ impl<'a, T> Columns<'a, T> {
     }
 }
 
-/// Returns `N` adjacent elements of a slice without a check. Checks of all accesses would be a
-/// third of the instructions of a small tile.
-///
-/// # Safety
-/// The slice has `N` elements from the index on.
-#[inline(always)]
-#[allow(unsafe_code)]
-pub unsafe fn chunk<T, const N: usize>(slice: &[T], index: usize) -> &[T; N] {
-    debug_assert!(index + N <= slice.len());
-    // SAFETY: the elements of an array are contiguous, and the caller guarantees that they exist.
-    unsafe { &*slice.as_ptr().add(index).cast() }
-}
-
 /// Returns a register with a number in every lane.
 #[inline(always)]
 pub fn splat<T: Real, E: Packed<T>>(value: T) -> E {
     E::from_f64(value.to_f64())
-}
-
-/// The maximum number of lanes of computations on slices.
-const MAX_LANES: usize = 8;
-
-/// Returns `0, 1, 2, …` in the lanes of a register.
-#[inline(always)]
-fn lane_indices<T: Real, E: Packed<T>>() -> E {
-    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
-    for lane in 0..E::LANES {
-        E::set_lane(&mut index, lane, lane as f64);
-    }
-    E::load(&index)
 }
 
 /// Helpers of the tests of products.

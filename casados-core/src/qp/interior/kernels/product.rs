@@ -5,7 +5,7 @@
 //! registers of AVX2 free. Three times four leave none: the compiler then spills accumulators to
 //! memory, which takes twice as long.
 
-use super::{Columns, chunk, splat};
+use super::{Columns, splat};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -30,32 +30,30 @@ pub enum Source<'a, T> {
     Matrix(Columns<'a, T>),
 }
 
-/// Whole registers of columns, from an index on.
-#[derive(Clone, Copy)]
-struct Cells<'a, C> {
-    data: &'a [C],
-    begin: usize,
-    ld: usize,
+impl<T> Source<'_, T> {
+    #[inline(always)]
+    fn skip(self, columns: usize) -> Self {
+        if let Source::Matrix(matrix) = self { Source::Matrix(matrix.skip(columns)) } else { self }
+    }
+    #[inline(always)]
+    fn skip_rows(self, rows: usize) -> Self {
+        if let Source::Matrix(matrix) = self { Source::Matrix(matrix.below(rows)) } else { self }
+    }
 }
 
 /// Computes `sums − X Yᵀ` for `R` registers of rows of `X` and `C` rows of `Y`, over `depth`
 /// columns.
 #[inline(always)]
-#[allow(unsafe_code)]
 fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
     sums: &mut [[E; R]; C],
-    x: Cells<'_, E::Cell>,
-    y: Cells<'_, T>,
+    mut x: &[E::Cell],
+    x_ld: usize,
+    mut y: &[T],
+    y_ld: usize,
     depth: usize,
 ) {
-    let Some(last) = depth.checked_sub(1) else { return };
-    if x.data.len() < x.begin + last * x.ld + R || y.data.len() < y.begin + last * y.ld + C {
-        return;
-    }
-    for k in 0..depth {
-        // SAFETY: `k ≤ last`, and the slices are as long as the last of these chunks needs.
-        let (column, row) =
-            unsafe { (chunk::<_, R>(x.data, x.begin + k * x.ld), chunk::<_, C>(y.data, y.begin + k * y.ld)) };
+    for _ in 0..depth {
+        let (Some(column), Some(row)) = (x.first_chunk::<R>(), y.first_chunk::<C>()) else { return };
         let mut registers = [E::from_f64(0.0); R];
         for (register, cell) in registers.iter_mut().zip(column) {
             *register = E::load(cell);
@@ -66,70 +64,69 @@ fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
                 *sum = sum.minus_product(register, factor);
             }
         }
+        x = x.get(x_ld..).unwrap_or_default();
+        y = y.get(y_ld..).unwrap_or_default();
     }
 }
 
-/// The target of a product, the matrix from which it is subtracted, and its factors.
-struct Operands<'a, T, E: Packed<T>> {
-    target: &'a mut [E::Cell],
-    ld: usize,
-    /// `None` if the source is the target.
-    source: Option<Cells<'a, E::Cell>>,
-    x: Cells<'a, E::Cell>,
-    y: Cells<'a, T>,
-    depth: usize,
-}
-
-/// Writes a tile of `target = source − X Yᵀ`, from a register of rows and a column on. The source
-/// is zero past its end; elements past the end of the target are not written.
+/// Writes a tile of `target = source − X Yᵀ`.
 #[inline(always)]
 fn write_tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
-    all: &mut Operands<'_, T, E>,
-    row: usize,
-    column: usize,
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    depth: usize,
 ) {
     let mut sums = [[E::from_f64(0.0); R]; C];
-    let begin = column * all.ld + row;
-    let (from, index, ld) = match all.source {
-        None => (&*all.target, begin, all.ld),
-        Some(source) => (source.data, source.begin + column * source.ld + row, source.ld),
+    let (mut columns, ld) = match source {
+        Source::Zero => (&[][..], 0),
+        Source::Target => (&*target, target_ld),
+        Source::Matrix(matrix) => (matrix.data, matrix.ld),
     };
-    if from.len() >= index + R {
-        for (c, sums) in sums.iter_mut().enumerate() {
-            let Some(cells) = from.get(index + c * ld..).and_then(|cells| cells.first_chunk::<R>()) else {
-                break;
-            };
-            for (sum, cell) in sums.iter_mut().zip(cells) {
-                *sum = E::load(cell);
-            }
+    for sums in &mut sums {
+        let Some(cells) = E::cells(columns).first_chunk::<R>() else { break };
+        for (sum, cell) in sums.iter_mut().zip(cells) {
+            *sum = E::load(cell);
         }
+        columns = columns.get(ld..).unwrap_or_default();
     }
-    let x = Cells { begin: all.x.begin + row, ..all.x };
-    let y = Cells { begin: all.y.begin + column, ..all.y };
-    tile::<T, E, R, C>(&mut sums, x, y, all.depth);
-    for (c, sums) in sums.iter().enumerate() {
-        let cells = all.target.get_mut(begin + c * all.ld..).and_then(|cells| cells.first_chunk_mut::<R>());
-        let Some(cells) = cells else { return };
+    tile::<T, E, R, C>(&mut sums, E::cells(x.data), x.ld / E::LANES, y.data, y.ld, depth);
+    let mut columns = target;
+    for sums in &sums {
+        let Some(cells) = E::cells_mut(columns).first_chunk_mut::<R>() else { return };
         for (sum, cell) in sums.iter().zip(cells) {
             sum.store(cell);
         }
+        columns = columns.get_mut(target_ld..).unwrap_or_default();
     }
 }
 
-/// Writes some registers of rows of `C` columns.
+/// Writes rows of `C` columns of `target = source − X Yᵀ`, from the first requested row on.
 #[inline(always)]
 fn strip<T: Real, E: Packed<T>, const C: usize>(
-    all: &mut Operands<'_, T, E>,
-    rows: Range<usize>,
-    column: usize,
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    rows: usize,
+    depth: usize,
 ) {
-    let mut row = rows.start;
-    while row + 1 < rows.end {
-        write_tile::<T, E, 2, C>(all, row, column);
-        row += 2;
-    }
-    if row < rows.end {
-        write_tile::<T, E, 1, C>(all, row, column);
+    let mut left = rows.div_ceil(E::LANES);
+    let mut row = 0;
+    while left > 0 {
+        let target = target.get_mut(row..).unwrap_or_default();
+        let (source, x) = (source.skip_rows(row), x.below(row));
+        let done = left.min(2);
+        if done == 2 {
+            write_tile::<T, E, 2, C>(target, target_ld, source, x, y, depth);
+        } else {
+            write_tile::<T, E, 1, C>(target, target_ld, source, x, y, depth);
+        }
+        left -= done;
+        row += done * E::LANES;
     }
 }
 
@@ -190,49 +187,42 @@ impl<T: Real, E: Packed<T>> Piece for Product<'_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { target, target_ld, source, x, y, rows, columns, depth, part, .. } = self;
-        let mut all = Operands::<T, E> {
-            target: E::cells_mut(target),
-            ld: target_ld / E::LANES,
-            source: match source {
-                Source::Zero => Some(Cells { data: &[], begin: 0, ld: 0 }),
-                Source::Target => None,
-                Source::Matrix(matrix) => {
-                    Some(Cells { data: E::cells(matrix.data), begin: 0, ld: matrix.ld / E::LANES })
-                }
-            },
-            x: Cells { data: E::cells(x.data), begin: 0, ld: x.ld / E::LANES },
-            y: Cells { data: y.data, begin: 0, ld: y.ld },
-            depth,
-        };
-        tiles(&mut all, rows.div_ceil(E::LANES), columns, part);
+        tiles::<T, E>(target, target_ld, source, x, y, (rows, columns, depth), part);
     }
 }
 
 #[inline(always)]
 fn tiles<T: Real, E: Packed<T>>(
-    all: &mut Operands<'_, T, E>,
-    rows: usize,
-    columns: Range<usize>,
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    (rows, columns, depth): (usize, Range<usize>, usize),
     part: Part,
 ) {
     let mut column = columns.start;
     while column < columns.end {
-        let first = if part == Part::Lower { column / E::LANES } else { 0 };
+        let first = if part == Part::Lower { column / E::LANES * E::LANES } else { 0 };
+        let target = target.get_mut(column * target_ld + first..).unwrap_or_default();
+        let source = source.skip(column).skip_rows(first);
+        let rows = rows.saturating_sub(first);
+        let (x, y) = (x.below(first), y.below(column));
         column += match columns.end - column {
             0..=2 => {
-                strip::<T, E, TWO_COLUMNS>(all, first..rows, column);
+                strip::<T, E, TWO_COLUMNS>(target, target_ld, source, x, y, rows, depth);
                 TWO_COLUMNS
             }
             3..=4 => {
-                strip::<T, E, MIN_TILE_COLUMNS>(all, first..rows, column);
+                strip::<T, E, MIN_TILE_COLUMNS>(target, target_ld, source, x, y, rows, depth);
                 MIN_TILE_COLUMNS
             }
             7.. if size_of::<E>() == 64 => {
-                strip::<T, E, COLUMNS_AVX512>(all, first..rows, column);
+                strip::<T, E, COLUMNS_AVX512>(target, target_ld, source, x, y, rows, depth);
                 COLUMNS_AVX512
             }
             _ => {
-                strip::<T, E, COLUMNS_AVX2>(all, first..rows, column);
+                strip::<T, E, COLUMNS_AVX2>(target, target_ld, source, x, y, rows, depth);
                 COLUMNS_AVX2
             }
         };
@@ -240,7 +230,8 @@ fn tiles<T: Real, E: Packed<T>>(
 }
 
 /// Computes `target − X y`, `rows` elements, over `depth` columns.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn subtract<T: Real, E: Packed<T>>(
     target: &mut [T],
     x: Columns<'_, T>,
@@ -248,86 +239,46 @@ pub fn subtract<T: Real, E: Packed<T>>(
     rows: usize,
     depth: usize,
 ) {
-    difference::<T, E>(target, Source::Target, x, y, (rows, depth));
-}
-
-/// Computes `target = source − X y`, `rows` elements, over `depth` columns.
-#[cfg_attr(feature = "std", inline(always))]
-#[cfg_attr(not(feature = "std"), inline(never))]
-pub fn difference<T: Real, E: Packed<T>>(
-    target: &mut [T],
-    mut source: Source<'_, T>,
-    mut x: Columns<'_, T>,
-    y: &[T],
-    (rows, depth): (usize, usize),
-) {
     let mut left = rows.div_ceil(E::LANES);
     let mut cells = E::cells_mut(target);
+    let mut x = x;
     loop {
         match left {
             0 => return,
-            1 => return subtract_rows::<T, E, 1>(cells, source, x, y, depth),
-            2 => return subtract_rows::<T, E, 2>(cells, source, x, y, depth),
-            3 => return subtract_rows::<T, E, 3>(cells, source, x, y, depth),
-            _ => subtract_rows::<T, E, 4>(cells, source, x, y, depth),
+            1 => return subtract_rows::<T, E, 1>(cells, x, y, depth),
+            2 => return subtract_rows::<T, E, 2>(cells, x, y, depth),
+            3 => return subtract_rows::<T, E, 3>(cells, x, y, depth),
+            _ => subtract_rows::<T, E, 4>(cells, x, y, depth),
         }
         left -= 4;
         cells = cells.get_mut(4..).unwrap_or_default();
         x = x.below(4 * E::LANES);
-        if let Source::Matrix(matrix) = source {
-            source = Source::Matrix(matrix.below(4 * E::LANES));
-        }
     }
 }
 
 #[inline(always)]
-#[allow(unsafe_code)]
 fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
     target: &mut [E::Cell],
-    source: Source<'_, T>,
     x: Columns<'_, T>,
     y: &[T],
     depth: usize,
 ) {
     let Some(target) = target.first_chunk_mut::<R>() else { return };
-    let (columns, ld, last) = (E::cells(x.data), x.ld / E::LANES, depth.saturating_sub(1));
-    let Some(factors) = y.get(..depth) else { return };
-    if depth > 0 && columns.len() < last * ld + R {
-        return;
+    let mut sums = [E::from_f64(0.0); R];
+    for (sum, cell) in sums.iter_mut().zip(&*target) {
+        *sum = E::load(cell);
     }
-    // Two sums of each register halve the chain of dependent products.
-    let mut sums = [[E::from_f64(0.0); R]; 2];
-    let from = match source {
-        Source::Zero => None,
-        Source::Target => Some(&*target),
-        Source::Matrix(matrix) => E::cells(matrix.data).first_chunk::<R>(),
-    };
-    if let Some(from) = from {
-        for (sum, cell) in sums[0].iter_mut().zip(from) {
-            *sum = E::load(cell);
-        }
-    }
-    let (pairs, rest) = factors.as_chunks::<2>();
-    for (k, pair) in pairs.iter().enumerate() {
-        for (i, (&factor, sums)) in pair.iter().zip(&mut sums).enumerate() {
-            // SAFETY: `2 k + i ≤ last`, and there are so many columns.
-            let column = unsafe { chunk::<_, R>(columns, (2 * k + i) * ld) };
-            let factor = splat::<T, E>(factor);
-            for (sum, cell) in sums.iter_mut().zip(column) {
-                *sum = sum.minus_product(E::load(cell), factor);
-            }
-        }
-    }
-    for &factor in rest {
-        // SAFETY: this is the last column.
-        let column = unsafe { chunk::<_, R>(columns, last * ld) };
+    let mut data = x.data;
+    for &factor in y.get(..depth).unwrap_or_default() {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { break };
         let factor = splat::<T, E>(factor);
-        for (sum, cell) in sums[1].iter_mut().zip(column) {
+        for (sum, cell) in sums.iter_mut().zip(column) {
             *sum = sum.minus_product(E::load(cell), factor);
         }
+        data = data.get(x.ld..).unwrap_or_default();
     }
-    for ((first, second), cell) in sums[0].iter().zip(&sums[1]).zip(target) {
-        (*first + *second).store(cell);
+    for (sum, cell) in sums.iter().zip(target) {
+        sum.store(cell);
     }
 }
 

@@ -1,8 +1,119 @@
 //! Products with vectors, by SIMD.
 
-use super::dots::symmetric;
-use super::{MAX_LANES, lane_indices, splat};
+use super::{Columns, splat};
+use crate::qp::element::get;
 use crate::scalar::{Packed, Real, Registers};
+
+/// The number of registers of a vector that are held at a time.
+const ACCUMULATORS: usize = 4;
+
+/// Computes `target + Xᵀ v`: `columns` dot products of columns of `X` with `v`, of `rows` elements.
+/// The padding of one factor must be zero.
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
+pub fn add_transposed<T: Real, E: Packed<T>>(
+    target: &mut [T],
+    x: Columns<'_, T>,
+    v: &[T],
+    rows: usize,
+    columns: usize,
+) {
+    let target = target.get_mut(..columns).unwrap_or_default();
+    let (mut left, mut x, mut v) = (rows.div_ceil(E::LANES), x, E::cells(v));
+    loop {
+        match left {
+            0 => return,
+            1 => return add_dots::<T, E, 1>(target, x, v),
+            2 => return add_dots::<T, E, 2>(target, x, v),
+            3 => return add_dots::<T, E, 3>(target, x, v),
+            _ => add_dots::<T, E, ACCUMULATORS>(target, x, v),
+        }
+        left -= ACCUMULATORS;
+        x = x.below(ACCUMULATORS * E::LANES);
+        v = v.get(ACCUMULATORS..).unwrap_or_default();
+    }
+}
+
+/// As [`add_transposed`], over `R` registers.
+#[inline(always)]
+fn add_dots<T: Real, E: Packed<T>, const R: usize>(target: &mut [T], x: Columns<'_, T>, v: &[E::Cell]) {
+    let Some(cells) = v.first_chunk::<R>() else { return };
+    let mut negative = [E::from_f64(0.0); R];
+    for (negative, cell) in negative.iter_mut().zip(cells) {
+        *negative = -E::load(cell);
+    }
+    let mut data = x.data;
+    for target in target {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { return };
+        let mut sum = E::from_f64(0.0);
+        for (&negative, cell) in negative.iter().zip(column) {
+            sum = sum.minus_product(E::load(cell), negative);
+        }
+        *target = *target + sum.total();
+        data = data.get(x.ld..).unwrap_or_default();
+    }
+}
+
+/// Computes `target + H v` with a symmetric matrix stored by its lower triangle; elements above the
+/// diagonal are ignored. Target and `v` are padded, `v` with zeros.
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
+pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+    let (last, mut begin) = (n.div_ceil(E::LANES), 0);
+    while begin < last {
+        let rows = (begin, n);
+        match last - begin {
+            1 => symmetric_rows::<T, E, 1>(target, h, ld, v, rows),
+            2 => symmetric_rows::<T, E, 2>(target, h, ld, v, rows),
+            3 => symmetric_rows::<T, E, 3>(target, h, ld, v, rows),
+            _ => symmetric_rows::<T, E, ACCUMULATORS>(target, h, ld, v, rows),
+        }
+        begin += ACCUMULATORS;
+    }
+}
+
+/// Adds the products of `R` registers of rows below the diagonal, of their transpose and of the
+/// diagonal.
+#[inline(always)]
+fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
+    target: &mut [T],
+    h: &[T],
+    ld: usize,
+    v: &[T],
+    (begin, n): (usize, usize),
+) {
+    let Some(cells) = E::cells(v).get(begin..).and_then(|v| v.first_chunk::<R>()) else { return };
+    let mut factors = [E::from_f64(0.0); R];
+    for (factor, cell) in factors.iter_mut().zip(cells) {
+        *factor = E::load(cell);
+    }
+    let (index, zero) = (lane_indices::<T, E>(), E::from_f64(0.0));
+    let mut sums = [zero; R];
+    let mut data = h.get(begin * E::LANES..).unwrap_or_default();
+    let columns = n.min((begin + R) * E::LANES);
+    for (j, (&factor, target)) in v.iter().zip(&mut *target).enumerate().take(columns) {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { break };
+        let (first, lane) = (j / E::LANES, splat::<T, E>(T::from_f64((j % E::LANES) as f64)));
+        let negative = splat::<T, E>(-factor);
+        let mut dot = zero;
+        for (r, ((sum, cell), &v)) in sums.iter_mut().zip(column).zip(&factors).enumerate() {
+            if begin + r < first {
+                continue;
+            }
+            let own = E::load(cell);
+            let value = if begin + r == first { E::select(lane.is_smaller(index), own, zero) } else { own };
+            *sum = sum.minus_product(value, negative);
+            dot = dot.minus_product(value, v);
+        }
+        let diagonal = if j < begin * E::LANES { T::ZERO } else { get(data, j - begin * E::LANES) };
+        *target = *target + (diagonal * factor - dot.total());
+        data = data.get(ld..).unwrap_or_default();
+    }
+    let rows = E::cells_mut(target).get_mut(begin..).unwrap_or_default();
+    for (cell, &sum) in rows.iter_mut().zip(&sums) {
+        (E::load(cell) + sum).store(cell);
+    }
+}
 
 /// Computes `target + H v` as [`symmetric`], for callers outside a SIMD kernel.
 pub fn add_symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
@@ -42,18 +153,25 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     }
 }
 
+/// The maximum number of lanes.
+const MAX_LANES: usize = 8;
+
+/// Returns `0, 1, 2, …` in the lanes of a register.
+#[inline(always)]
+fn lane_indices<T: Real, E: Packed<T>>() -> E {
+    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
+    for lane in 0..E::LANES {
+        E::set_lane(&mut index, lane, lane as f64);
+    }
+    E::load(&index)
+}
+
 /// Copies the lower triangle to the upper one.
 #[cfg_attr(feature = "std", inline(always))]
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
-    if E::LANES > 1 {
-        let blocks = n.div_ceil(E::LANES);
-        for column in 0..blocks {
-            for row in column..blocks {
-                mirror_block::<T, E>(matrix, ld, n, [row * E::LANES, column * E::LANES]);
-            }
-        }
-        return;
+    if E::LANES > 1 && n <= E::LANES {
+        return mirror_register::<T, E>(matrix, ld, n);
     }
     for column in 0..n {
         let (mut below, mut above) = (column * ld + column, column * ld + column);
@@ -68,73 +186,29 @@ pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
     }
 }
 
-/// As [`mirror`], for a block of one register of rows and as many columns, from `row` and `column`
-/// on.
+/// As [`mirror`], for a matrix whose columns are one register each.
 #[inline(always)]
-fn mirror_block<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize, [row, column]: [usize; 2]) {
+fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
+    let mut own = [E::from_f64(0.0); MAX_LANES];
+    let mut columns = &*matrix;
+    for own in own.iter_mut().take(n) {
+        if let Some(cell) = E::cells(columns).first() {
+            *own = E::load(cell);
+        }
+        columns = columns.get(ld..).unwrap_or_default();
+    }
     let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MAX_LANES];
-    let from = matrix.get(column * ld + row..).unwrap_or_default();
-    transpose_block::<T, E>(&mut turned, from, ld, n - column);
-    let index = lane_indices::<T, E>();
-    let mut columns = matrix.get_mut(row * ld + column..).unwrap_or_default();
-    for (lane, turned) in turned.iter().enumerate().take((n - row).min(E::LANES)) {
+    let (Some(from), Some(to)) = (own.get(..E::LANES), turned.get_mut(..E::LANES)) else { return };
+    E::transpose(from, to);
+    let (index, one) = (lane_indices::<T, E>(), E::from_f64(1.0));
+    let (mut columns, mut column) = (matrix, E::from_f64(0.0));
+    for (own, turned) in own.iter().zip(&turned).take(n) {
+        let value = E::select(index.is_smaller(column), E::load(turned), *own);
         if let Some(cell) = E::cells_mut(columns).first_mut() {
-            let mut value = E::load(turned);
-            if row == column {
-                value = E::select(E::lt(index, E::from_f64(lane as f64)), value, E::load(cell));
-            }
             value.store(cell);
         }
         columns = columns.get_mut(ld..).unwrap_or_default();
-    }
-}
-
-/// Transposes the first register of rows of a matrix; past the last column, elements are zero.
-#[inline(always)]
-fn transpose_block<T: Real, E: Packed<T>>(
-    to: &mut [E::Cell; MAX_LANES],
-    from: &[T],
-    ld: usize,
-    columns: usize,
-) {
-    let mut own = [E::from_f64(0.0); MAX_LANES];
-    let (cells, ld) = (E::cells(from), ld / E::LANES);
-    for (index, own) in own.iter_mut().enumerate().take(E::LANES) {
-        if index < columns
-            && let Some(cell) = cells.get(index * ld)
-        {
-            *own = E::load(cell);
-        }
-    }
-    if let (Some(from), Some(to)) = (own.get(..E::LANES), to.get_mut(..E::LANES)) {
-        E::transpose(from, to);
-    }
-}
-
-/// Adds the transpose of `rows` rows of `columns` columns.
-#[cfg_attr(feature = "std", inline(always))]
-#[cfg_attr(not(feature = "std"), inline(never))]
-pub fn add_rows<T: Real, E: Packed<T>>(target: &mut [T], from: &[T], ld: usize, [rows, columns]: [usize; 2]) {
-    if E::LANES == 1 {
-        for (i, column) in from.chunks(ld.max(1)).take(columns).enumerate() {
-            for (target, &value) in target.iter_mut().skip(i).step_by(ld.max(1)).zip(column).take(rows) {
-                *target = *target + value;
-            }
-        }
-        return;
-    }
-    for column in (0..columns).step_by(E::LANES) {
-        for row in (0..rows).step_by(E::LANES) {
-            let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MAX_LANES];
-            let block = from.get(column * ld + row..).unwrap_or_default();
-            transpose_block::<T, E>(&mut turned, block, ld, columns - column);
-            let cells = E::cells_mut(target.get_mut(row * ld + column..).unwrap_or_default());
-            for (lane, turned) in turned.iter().enumerate().take((rows - row).min(E::LANES)) {
-                if let Some(cell) = cells.get_mut(lane * (ld / E::LANES)) {
-                    (E::load(cell) + E::load(turned)).store(cell);
-                }
-            }
-        }
+        column = column + one;
     }
 }
 
@@ -146,11 +220,19 @@ pub fn copy<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
     }
 }
 
-/// Computes `source − target` in whole registers.
+/// Copies whole registers of `−source`.
 #[inline(always)]
-pub fn subtract_from<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
+pub fn copy_negative<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
     for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
-        (E::load(source) - E::load(target)).store(target);
+        (-E::load(source)).store(target);
+    }
+}
+
+/// Adds whole registers.
+#[inline(always)]
+pub fn add<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
+    for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
+        (E::load(target) + E::load(source)).store(target);
     }
 }
 
@@ -180,43 +262,6 @@ mod tests {
                 symmetric::<f64, f64>(&mut target, &h, ld, &v, n);
             }
             assert_eq!(target[..n], expected, "{n}");
-        }
-    }
-
-    struct Transposes<'a> {
-        mirrored: &'a mut [f64],
-        sums: &'a mut [f64],
-        n: usize,
-        ld: usize,
-    }
-
-    impl crate::scalar::Registers<f64> for Transposes<'_> {
-        fn run<E: Packed<f64>>(self) {
-            let Self { mirrored, sums, n, ld } = self;
-            add_rows::<f64, E>(sums, mirrored, ld, [n / 2, n]);
-            mirror::<f64, E>(mirrored, ld, n);
-        }
-    }
-
-    /// The definition, for matrices of one register and of several.
-    #[test]
-    fn transposes_of_all_sizes() {
-        for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {
-            let ld = LEADING_DIMENSIONS[padding](n);
-            let before = integers(n, n, ld, 1);
-            let (mut mirrored, mut sums) = (before.clone(), integers(n, n, ld, 2));
-            let own = sums.clone();
-            let transposes = Transposes { mirrored: &mut mirrored, sums: &mut sums, n, ld };
-            if padding == 0 {
-                f64::registers(transposes)
-            } else {
-                crate::scalar::Registers::run::<f64>(transposes)
-            }
-            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                assert_eq!(mirrored[j * ld + i], before[i.min(j) * ld + i.max(j)], "{n} {i} {j}");
-                let sum = if j < n / 2 { own[j * ld + i] + before[i * ld + j] } else { own[j * ld + i] };
-                assert_eq!(sums[j * ld + i], sum, "{n} {i} {j}");
-            }
         }
     }
 }

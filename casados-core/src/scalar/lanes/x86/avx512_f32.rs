@@ -9,7 +9,6 @@ enter!("avx512f,avx512dq,avx512vl");
 halves!(f32, avx2_f32, _mm512_castps512_ps256, _mm512_extractf32x8_ps);
 masked!(f32, 16, u16, _mm512_mask_loadu_ps, _mm512_mask_storeu_ps, _mm512_mask_blend_ps);
 transpose_in_memory!(f32);
-super::super::totals_of_columns!();
 wrap! {
     splat(a: f32) -> Register = _mm512_set1_ps;
     add(a: Register, b: Register) -> Register = _mm512_add_ps;

@@ -39,19 +39,6 @@ define! {
         let [b, d, f, h] = quarters(odd);
         [a, b, c, d, e, f, g, h]
     }}
-    totals(rows: [Register; 8]) -> Register {{
-        let [a, b, c, d, e, f, g, h] = rows;
-        let ab = _mm512_add_pd(_mm512_unpacklo_pd(a, b), _mm512_unpackhi_pd(a, b));
-        let cd = _mm512_add_pd(_mm512_unpacklo_pd(c, d), _mm512_unpackhi_pd(c, d));
-        let ef = _mm512_add_pd(_mm512_unpacklo_pd(e, f), _mm512_unpackhi_pd(e, f));
-        let gh = _mm512_add_pd(_mm512_unpacklo_pd(g, h), _mm512_unpackhi_pd(g, h));
-        let (abcd, efgh) = (add_quarters(ab, cd), add_quarters(ef, gh));
-        add_quarters(abcd, efgh)
-    }}
-    /// The sums of adjacent quarters, of the first register, then of the second.
-    add_quarters(a: Register, b: Register) -> Register {
-        _mm512_add_pd(_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b))
-    }
     /// All first quarters, all second, third, and fourth ones.
     quarters(rows: [Register; 4]) -> [Register; 4] {{
         let [a, b, c, d] = rows;
