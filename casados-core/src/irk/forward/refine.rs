@@ -117,7 +117,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
                     dy: panel(self.dy(), column, nk * S).as_chunks().0,
                     a: &coefficients.a,
                     h: work.inputs.time.step,
-                    panel_column: column,
+                    panel_column: c,
                     direction: work.variable_scratch[0].as_mut(),
                     model: PhantomData,
                 });
