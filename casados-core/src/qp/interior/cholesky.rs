@@ -280,7 +280,7 @@ fn eliminate_pivot<T: Real, const W: usize, const I: usize>(
 }
 
 /// Returns the replacement of a pivot that is not positive; `before` is the diagonal before
-/// elimination. A negative pivot is kept if `indefinite`, otherwise a large number replaces it.
+/// elimination. A negative pivot stays if `indefinite`, otherwise it becomes a large number.
 #[cold]
 #[inline(never)]
 fn other_pivot<T: Real>(

@@ -36,8 +36,8 @@ impl<'a, T> Columns<'a, T> {
     }
 }
 
-/// Returns `N` adjacent elements of a slice without a check. Bounds checks would be a third of the
-/// instructions of a small tile.
+/// Returns `N` adjacent elements of a slice without a check. Checks of all accesses would be a
+/// third of the instructions of a small tile.
 ///
 /// # Safety
 /// The slice has `N` elements from the index on.

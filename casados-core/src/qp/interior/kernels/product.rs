@@ -310,7 +310,7 @@ fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
     let (pairs, rest) = factors.as_chunks::<2>();
     for (k, pair) in pairs.iter().enumerate() {
         for (i, (&factor, sums)) in pair.iter().zip(&mut sums).enumerate() {
-            // SAFETY: `2 k + i ≤ last`, and there are `last + 1` columns.
+            // SAFETY: `2 k + i ≤ last`, and there are so many columns.
             let column = unsafe { chunk::<_, R>(columns, (2 * k + i) * ld) };
             let factor = splat::<T, E>(factor);
             for (sum, cell) in sums.iter_mut().zip(column) {
