@@ -151,7 +151,7 @@ fn solve_from_both_guesses(known: &KnownProblem) -> Result<Vec<Run>, Box<dyn std
 
 /// The conditions of optimality hold to 1e-8 in units, each off by a hundred at most, and the
 /// reduced Hessian is at least a half of these: solutions are as near as 1e-5, also where the
-/// origin of a control is 1e8 away and the room between its bounds is two.
+/// origin of a control is 1e8 away and the distance of its bounds is two.
 #[test]
 fn solutions_in_all_units() -> Test {
     let mut random = Random::new(11);

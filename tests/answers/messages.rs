@@ -173,7 +173,7 @@ fn messages_about_vanishing_constraint_gradients() {
     assert!(matches!(numbers[..], [full, points] if 0 < full && full < points), "{rank}");
 }
 
-/// Of a model without parameters none is listed, and one reference *is* at stages.
+/// Messages about a model without parameters, and about one reference (singular verb).
 #[test]
 fn of_what_there_is_none() -> Test {
     let problem = Problem::new(casados::ocp::Map::<Push, f64>::new())

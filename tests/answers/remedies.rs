@@ -96,7 +96,7 @@ fn warm_starts_close_to_bounds() -> Test {
     Ok(())
 }
 
-/// Beside a bound at zero, where the smallest numbers are, too.
+/// Warm starts next to a bound at zero, with pushes down to the smallest positive number.
 #[test]
 fn the_smallest_push_beside_zero() -> Test {
     for push in [f64::MIN_POSITIVE, 1e-300, 1e-30, 1e-20, 1e-12] {

@@ -215,7 +215,7 @@ fn first_squared(_x: [f64; 2], u: [f64; 2]) -> f64 {
     u[0] * u[0]
 }
 
-/// What the equations alone determine takes a step, and one more for its multiplier.
+/// The equations determine the solution: one step for variables, one for multipliers.
 #[test]
 fn one_interval_and_a_control_without_effect() -> Test {
     let mut ocp = Problem::new(Erk::<Pushed, Rk4>::new(Options::default())?)
@@ -228,8 +228,8 @@ fn one_interval_and_a_control_without_effect() -> Test {
     Ok(())
 }
 
-/// From zero no control within one reaches two: with penalties in place of bounds, too, residuals
-/// are those of the bounds that were given.
+/// Bounded controls cannot reach the terminal bound. Residuals contain violations of the given
+/// bounds, also if penalties replace these.
 #[test]
 fn violations_of_an_infeasible_problem_are_in_its_residuals() -> Test {
     let problem = Problem::new(Map::<Add, f64>::new()).stage_cost(GeneralCost::<Squares>::new());

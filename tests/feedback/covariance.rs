@@ -258,7 +258,7 @@ fn smoother_of_a_random_walk() -> Test {
     Ok(())
 }
 
-/// Of two parameters only the product is seen.
+/// Only the product of two parameters is measured.
 #[function]
 fn stays(x: [f64; 3]) -> [f64; 3] {
     x

@@ -37,8 +37,8 @@ mod ball {
 
 const GRAVITY: f64 = 9.81;
 
-/// A ball that falls from a height and bounces `count` times, with a wind; each flight takes as
-/// long as it takes, with a guess of that.
+/// A ball that falls from a height and bounces `count` times, with a wind; durations of flights are
+/// free.
 fn flight_problem(
     count: usize,
     n: usize,
@@ -134,8 +134,8 @@ fn multipliers_across_an_impact() -> Test {
     Ok(())
 }
 
-/// From guesses a tenth to three times as long as flights are. Durations have no choice: steps from
-/// feasible points change multipliers alone.
+/// From guesses a tenth to three times the durations of flights. Equations determine the durations:
+/// steps from feasible points change only multipliers.
 #[test]
 fn flights_are_found_from_far() -> Test {
     for guess in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0] {

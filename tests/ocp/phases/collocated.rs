@@ -1,4 +1,4 @@
-//! Phases whose stages are variables: the same discrete solution as by integrators.
+//! Phases with collocation: the same discrete solution as with integrators.
 
 use super::kkt;
 use crate::Test;
@@ -8,7 +8,7 @@ use casados::ocp::{
 };
 use casados::prelude::*;
 
-/// A pendulum that is swung up for a time that is found, and on which a weight is hung then.
+/// A pendulum that swings up for a free duration; then a weight is attached.
 #[ode]
 mod swings {
     #[ode(duration = p)]
@@ -52,7 +52,7 @@ macro_rules! phases {
     }};
 }
 
-/// Outcome, the time of the first phase, and controls of both.
+/// Returns the outcome, the duration of the first phase, and the controls of both.
 fn solve<P, Q>(
     (mut first, mut second): (HeapOcp<P>, HeapOcp<Q>),
     by_sqp: bool,
@@ -96,7 +96,7 @@ fn solutions_are_those_of_integrators() -> Test {
     Ok(())
 }
 
-/// The conditions of optimality, by code of its own, of a QP that is written at the solution.
+/// Checks the KKT conditions of the QP at the solution by separate code.
 #[test]
 fn conditions_of_optimality() -> Test {
     let swing = Collocation::new(Irk::<Swing, Gauss<2>>::new(Options::default())?)?;
@@ -105,7 +105,7 @@ fn conditions_of_optimality() -> Test {
     let mut both = Phases::new(&mut first).then(Jump::<Hang>::new(), &mut second).join()?;
     assert!(HeapIpm::new(&both)?.solve(&mut both)?.is_converged());
     kkt::check(&mut both)?;
-    // A second run begins where the first one ended.
+    // A second run starts at the solution.
     let mut ipm = HeapIpm::new(&both)?;
     let outcome = ipm.solve(&mut both)?;
     assert!(outcome.is_converged(), "{outcome}");

@@ -1,11 +1,11 @@
-//! Parameters that are found in several phases, and errors that say the phase.
+//! Free parameters shared by several phases, and errors that contain the phase.
 
 use super::kkt;
 use crate::Test;
 use casados::ocp::{Continuous, GeneralCost, HeapIpm, HeapSqp, Horizon, Jump, OcpError, Phases, Problem};
 use casados::prelude::*;
 
-/// A car is pushed for a time that is found, by 2 N: its speed.
+/// The speed of a car that is pushed by 2 N for a free duration.
 #[ode(duration = p.duration)]
 mod push {
     pub struct Pushed {
@@ -21,7 +21,7 @@ mod push {
     }
 }
 
-/// It is braked for a second, by 1 N, and rolls for another one; its place and speed then.
+/// The car is braked by 1 N for a second (speed), and rolls for another one (position, speed).
 #[ode]
 mod roll {
     pub struct Rolls {
@@ -46,8 +46,8 @@ mod roll {
     }
 }
 
-/// A metre after the last second: `v = (2 T − 1)/m = 1`, and `T + 4/m` is least for `m = √8`. The
-/// price of the mass is that of the last phase, what it does is in the others.
+/// A metre after the last second: `v = (2 T − 1)/m = 1`, and `T + 4/m` is minimal for `m = √8`.
+/// The mass is in the cost of the last phase, and in the dynamics of the others.
 #[test]
 fn parameters_are_shared() -> Test {
     for by_sqp in [false, true] {
@@ -87,7 +87,7 @@ fn parameters_are_shared() -> Test {
     Ok(())
 }
 
-/// Bounds of both phases hold, and have their multipliers where they were given.
+/// Bounds of both phases hold; each phase has the multipliers of its own bounds.
 #[test]
 fn bounds_of_shared_parameters() -> Test {
     let mut push = Problem::new(Irk::<Push, Gauss<1>>::new(Options::default())?)
@@ -131,10 +131,10 @@ fn mistakes_are_named() -> Test {
         assert!(matches!(error, OcpError::Phase { phase: 1, model: "Brake", .. }), "{error}");
         assert!(error.to_string().contains("free in it and in the phase before"), "{error}");
     }
-    // Nobody can be before the first one.
+    // The first phase has no phase before it.
     let error = Phases::new(&mut push).share("p.mass").join().err().ok_or("it is shared")?;
     assert!(matches!(error, OcpError::Phase { phase: 0, .. }), "{error}");
-    // What an interval lacks is said with its phase.
+    // Errors of an interval contain its phase.
     let mut below =
         Problem::new(Irk::<Root, Gauss<1>>::new(Options::default())?).on(Horizon::uniform(2, 0.5))?;
     below.guess(&[-1.0], &[])?.set_parameters(.., &[0.0])?;

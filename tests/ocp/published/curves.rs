@@ -6,7 +6,7 @@ use casados::prelude::*;
 use casados::qp::Clarabel;
 use nalgebra::SVector;
 
-/// Height over the distance; its slope is the control.
+/// Height as a function of distance; the control is its slope.
 #[ode(linear = u, integrals(length = (1.0 + u * u).sqrt(), energy = x * (1.0 + u * u).sqrt()))]
 mod chain {
     pub fn chain(_x: f64, u: f64) -> f64 {
@@ -65,8 +65,7 @@ fn hanging_chain() -> Test {
     Ok(())
 }
 
-/// Earth and moon turn around their centre of mass, and with them the axes; a third body has no
-/// mass. The time of one round is found.
+/// The restricted three-body problem in rotating axes, with a free period.
 #[ode(duration = p)]
 mod bodies {
     const MOON: f64 = 0.012277471;
@@ -83,7 +82,7 @@ mod bodies {
             x[1] - 2.0 * x[2] - EARTH * x[1] / de - MOON * x[1] / dm,
         ]
     }
-    /// The energy in the turning axes is constant, so that the fourth state returns if three do.
+    /// Periodicity of three states; by the Jacobi integral the fourth is periodic, too.
     #[function]
     fn returns(x0: [f64; 4], x: [f64; 4], _p: f64) -> [f64; 3] {
         [x[0] - x0[0], x[1] - x0[1], x[2] - x0[2]]
@@ -97,8 +96,7 @@ mod bodies {
 fn periodic_orbit_of_three_bodies() -> Test {
     const PERIOD: f64 = 17.065_216_560_157_964;
     const SPEED: f64 = -2.0015851063790825;
-    // From a guess of four digits, and nodes that are near to each other where the moon or the
-    // earth are near.
+    // A guess of four digits; nodes are dense near the moon and the earth.
     let (speed, period) = (-2.0016, 17.065);
     let (mut t, mut x) = (0.0, [0.994_f64, 0.0, 0.0, speed]);
     let (mut parts, mut guess) = (vec![t], vec![x]);

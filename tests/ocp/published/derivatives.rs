@@ -61,7 +61,7 @@ fn compare<P: Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>(
     Ok(())
 }
 
-/// Costates where nothing is zero.
+/// Sets nonzero costates.
 fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) {
     for k in 0..ocp.intervals() {
         if let Some(stage) = ocp.iterate_mut().stage_mut(k) {
@@ -72,7 +72,7 @@ fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) {
     }
 }
 
-/// The rocket, by distance, speed, mass, end time and thrust.
+/// Derivatives of the rocket by distance, speed, mass, end time and thrust.
 #[test]
 fn of_goddards_rocket() -> Test {
     const N: usize = 3;
@@ -96,7 +96,7 @@ fn of_goddards_rocket() -> Test {
     })
 }
 
-/// The five substances, by themselves and the five rates, in units of 1e4 minutes.
+/// Derivatives of the five substances by initial substances and rates; time in 1e4 minutes.
 #[test]
 fn of_pinene() -> Test {
     let times: Vec<f64> = SAMPLES.iter().map(|(time, _)| 1e-4 * time).collect();

@@ -17,7 +17,7 @@ pub mod rocket {
         let gravity = 1.0 / (x.distance * x.distance);
         State { distance: x.speed, speed: (u - drag) / x.mass - gravity, mass: -2.0 * u }
     }
-    /// With a thrust that is linear in time.
+    /// The same model with a thrust linear in time.
     #[ode(linear = u, duration = p)]
     pub fn throttled(x: &State, u: f64, p: f64) -> State {
         rocket(x, u, p)
@@ -31,7 +31,7 @@ pub mod rocket {
 const COPS: f64 = 1.01283;
 pub const THRUST: f64 = 3.5;
 
-/// As high as possible with four tenths of the mass as propellant.
+/// Maximum altitude with a propellant of 0.4 of the mass.
 #[test]
 fn goddards_rocket() -> Test {
     const N: usize = 50;
@@ -50,8 +50,7 @@ fn goddards_rocket() -> Test {
     Ok(())
 }
 
-/// Full thrust, a singular arc on which drag and weight are balanced, none; the times of both
-/// switches and of the summit are found.
+/// Full thrust, singular arc, coasting; both switching times and the end time are free.
 #[test]
 fn goddards_rocket_in_phases() -> Test {
     let rocket = || Irk::<Rocket, Gauss<3>>::new(Options::default());
@@ -87,7 +86,7 @@ mod reentry {
         pub height: f64,
         pub latitude: f64,
         pub speed: f64,
-        /// Of the flight path, and the azimuth.
+        /// The flight path angle.
         pub slope: f64,
         pub azimuth: f64,
     }

@@ -1,7 +1,7 @@
-//! Problems of public collections in the words of their books: no time scaled by hand, no parameter
-//! as a control, no copy of a state. Values are closed forms, or those of published tables.
+//! Problems of public collections as published: no time scaled by hand, no parameter as a control,
+//! no copy of a state. Values are closed forms or published optima.
 //!
-//! | problem | words | value | source |
+//! | problem | formulation | value | source |
 //! | --- | --- | --- | --- |
 //! | Bryson and Denham | linear control, points inside intervals, integral | 4 | closed form |
 //! | condition in the middle | phases, linear control, integral | 0.92053144 | closed form; PSOPT `interior_point` |
@@ -13,8 +13,8 @@
 //! | reentry of the shuttle | free end time | 34.1412° | PSOPT `shuttle_reentry` |
 //!
 //! COPS: E. D. Dolan, J. J. Moré, T. S. Munson, "Benchmarking optimization software with COPS 3.0",
-//! ANL/MCS-TM-273, 2004. Values of PSOPT are those of `doc/SQP_ALL_EXAMPLES.csv`. Others are beside
-//! the tests of their words: the brachistochrone and linear tangent steering (`free_end`), predator
+//! ANL/MCS-TM-273, 2004. Values of PSOPT are from `doc/SQP_ALL_EXAMPLES.csv`. Other published
+//! problems: the brachistochrone and linear tangent steering (`free_end`), predator
 //! and prey (`free_estimates`), Delta III (`phases/launch`).
 
 mod curves;

@@ -1,10 +1,10 @@
-//! Catalysts along a reactor, and the isomerisation of α-pinene.
+//! Catalyst mixing in a plug-flow reactor, and the isomerisation of α-pinene.
 
 use crate::Test;
 use casados::ocp::{Continuous, GeneralCost, HeapIpm, HeapSqp, Horizon, Phases, Problem};
 use casados::prelude::*;
 
-/// Two substances along a reactor, and the place in it; `u` is the part of the first catalyst.
+/// Two substances along a reactor, and the position; `u` is the fraction of the first catalyst.
 #[ode(duration = p)]
 mod reactor {
     pub struct State {
@@ -22,8 +22,8 @@ mod reactor {
     }
 }
 
-/// As much of the third substance as possible: the first catalyst alone, a mixture, the second
-/// alone. COPS has −4.80556e-2 from 100 intervals of Gauss's method of order 6.
+/// Maximum yield of the third substance: the first catalyst alone, a mixture, the second alone.
+/// COPS has −4.80556e-2 from 100 intervals of Gauss's method of order 6.
 #[test]
 fn catalyst_mixing() -> Test {
     const COPS: f64 = -4.80556e-2;
@@ -88,7 +88,7 @@ pub const SAMPLES: [(f64, [f64; 5]); 9] = [
     (36420.0, [4.5, 63.1, 3.8, 2.9, 25.7]),
 ];
 
-/// Five rates from eight measurements, with nodes where these are.
+/// Five rates from eight measurements, with nodes at their times.
 #[test]
 fn isomerisation_of_pinene() -> Test {
     const COPS: f64 = 19.8721;

@@ -1,10 +1,10 @@
-//! Bryson and Denham's wall, and a condition in the middle.
+//! The Bryson-Denham problem, and an interior-point condition.
 
 use crate::Test;
 use casados::ocp::{Continuous, GeneralCost, HeapIpm, HeapSqp, Horizon, Phases, Problem};
 use casados::prelude::*;
 
-/// A cart before a wall; `q` is half of the square of the force, integrated.
+/// A cart before a wall; `q` is the integral of half the squared force.
 #[ode(linear = u, integrals(effort = 0.5 * u * u))]
 mod cart {
     pub fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
@@ -47,7 +47,7 @@ fn cart_before_a_wall() -> Test {
     Ok(())
 }
 
-/// `½ q` is what is to be small.
+/// The cost is the integral `q`.
 #[ode(linear = u, integrals(cost = x * x + u * u))]
 mod way {
     pub fn way(_x: f64, u: f64) -> f64 {
@@ -85,7 +85,7 @@ fn condition_in_the_middle() -> Test {
         assert!(outcome.is_converged(), "{outcome}");
         drop(way);
         assert!((outcome.objective - expected).abs() < 1e-4 * expected, "{outcome}");
-        // The force jumps where the condition is: `ẋ` of both solutions there.
+        // The control `u = ẋ` jumps at the interior point.
         let (one, other) = (before.solution()?, after.solution()?);
         let slope = |a: f64, b: f64, length: f64| (b * length.cosh() - a) / length.sinh();
         let (left, right) = (slope(1.0, 0.9, 0.75), -slope(0.75, 0.9, 0.25));

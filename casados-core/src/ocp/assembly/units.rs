@@ -54,8 +54,8 @@ pub(in crate::ocp) fn tolerance_factor(unit: f64) -> f64 {
 /// The unit of products of slacks and multipliers at the end of a run, for this value of the
 /// objective: the sum of products is the distance of the objective from its minimum.
 ///
-/// It is at most the objective unit, which contains the units of variables, however distant their
-/// origins, and at least that or one, whichever is smaller.
+/// It is the magnitude of the objective, at most `objective_unit` and at least
+/// `min(objective_unit, 1)`. Distant origins of variables increase `objective_unit` only.
 pub(in crate::ocp) fn product_unit(objective: f64, objective_unit: f64) -> f64 {
     if objective.is_finite() {
         objective.abs().clamp(objective_unit.min(1.0), objective_unit)
@@ -137,7 +137,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// hundredth of the present one. For example, a cost `(x − r)²` with a large `r` is large at
     /// the guess, and small at a solution nearby. `rows` are the units of rows, `tolerance` is
     /// the smallest tolerance of residuals in units of the objective. With `counts_changes` the
-    /// unit also covers the changes of the gradient, whose rounding errors the gradient has.
+    /// unit also covers the rounding errors of the terms of the gradient.
     pub(in crate::ocp) fn reduced_objective_unit(
         &self,
         rows: &[T],

@@ -116,7 +116,7 @@ struct TrialPoint<T> {
 struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
     begin: PhaseStart,
-    /// Names of the parameters that are those of the phase before.
+    /// The names of the parameters shared with the phase before.
     shares: Vec<&'a str>,
     link: Option<Box<dyn Link<T> + 'a>>,
     /// The start of the next phase.
@@ -153,8 +153,8 @@ impl<'a, T: Real> Phases<'a, T> {
         self
     }
 
-    /// Shares a free parameter, by name, between the last phase and the phase before: one value is
-    /// found for both.
+    /// Shares a free parameter, by name, between the last phase and the phase before: both have one
+    /// value.
     ///
     /// # Example
     /// A car is pushed and braked for a second each; its final speed determines its mass.
@@ -355,7 +355,7 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
         Self { problem, begin, shares: Vec::new(), link: None, next: None, first: 0 }
     }
 
-    /// Which of its free parameters are those of the phase before.
+    /// Looks up the shared names among the free parameters of this phase and the phase before.
     ///
     /// # Errors
     /// [`OcpError::Phase`]

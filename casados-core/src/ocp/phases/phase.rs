@@ -48,8 +48,8 @@ impl PhaseSize {
     }
 }
 
-/// The start of a phase: its free states are decided there, then the parameters that it does not
-/// share with the phase before.
+/// The start of a phase, whose decision variables are its free states, then the parameters that it
+/// does not share with the phase before.
 #[derive(Clone, Debug)]
 pub(super) struct PhaseStart {
     pub size: PhaseSize,
@@ -58,12 +58,12 @@ pub(super) struct PhaseStart {
 }
 
 impl PhaseStart {
-    /// Returns the indices of the parameters that are decided there.
+    /// Returns the indices of the parameters that are decision variables at the start.
     pub fn parameters(&self) -> impl Iterator<Item = usize> {
         self.shared.iter().enumerate().filter(|(_, shared)| shared.is_none()).map(|(w, _)| w)
     }
 
-    /// Returns the number of variables that are decided there: states, then parameters.
+    /// Returns the number of decision variables at the start: states, then parameters.
     pub fn start_variable_count(&self) -> usize {
         self.size.free_start_states().len() + self.parameters().count()
     }

@@ -118,7 +118,7 @@ fn gather_start_variables<T: Real>(begin: &PhaseStart, x: &[T], u: &[T], to: &mu
     }
 }
 
-/// Scatters the elements that are decided at the start of a phase: the inverse of
+/// Scatters the decision variables at the start of a phase: the inverse of
 /// [`gather_start_variables`].
 fn scatter_start_variables<T: Real>(begin: &PhaseStart, decided: &[T], x: &mut [T], u: &mut [T]) {
     let size = begin.size;
@@ -200,8 +200,8 @@ pub(super) fn write_start_variable_bounds<T: Real>(
     }
 }
 
-/// Writes the start of a phase: the decided elements, and the shared parameters `before` of the
-/// phase before; elements neither decided nor given are zero.
+/// Writes the start of a phase: the decision variables `decided`, and the parameters shared with
+/// the phase before from `before`; other elements are zero unless given.
 pub(super) fn write_start_state<T: Real>(begin: &PhaseStart, decided: &[T], before: &[T], start: &mut [T]) {
     let (x, w) = start.split_at_mut_checked(begin.size.nx).unwrap_or_default();
     x.get_mut(begin.size.given_states..).unwrap_or_default().fill(T::ZERO);
@@ -213,7 +213,7 @@ pub(super) fn write_start_state<T: Real>(begin: &PhaseStart, decided: &[T], befo
     }
 }
 
-/// Writes the columns of [`write_start_state`] to the QP; the decided variables begin at `first`,
+/// Writes the columns of [`write_start_state`] to the QP; the decision variables begin at `first`,
 /// the parameters of the phase before at `before`.
 pub(super) fn write_start_columns<T: Real>(
     begin: &PhaseStart,

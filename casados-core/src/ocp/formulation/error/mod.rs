@@ -322,7 +322,7 @@ pub enum OcpError {
 }
 
 impl OcpError {
-    /// As an error of this phase.
+    /// Adds the phase to an error.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn in_phase(mut self, index: usize) -> Self {
         if let Self::Integration { phase, .. }

@@ -141,7 +141,7 @@ impl<'c> RunState<'c> {
     }
 
     /// Returns whether a tiny step follows another that left more than half of the KKT error: tiny
-    /// steps change multipliers alone, and can still reduce the complementarity.
+    /// steps change only multipliers, and can still reduce the complementarity.
     pub fn count_tiny_step(&mut self, is_tiny: bool) -> bool {
         let last_error = self.tiny_step_error.take();
         self.tiny_step_error = is_tiny.then_some(self.nlp_error);
@@ -154,7 +154,8 @@ impl<'c> RunState<'c> {
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
-    /// Updates the unit of products at an iterate: the objective unit, until the run would end.
+    /// Updates the unit of products at an iterate: `objective_unit` before the objective is
+    /// rescaled, and in the restoration phase.
     pub fn update_product_unit(&mut self, objective: f64) {
         let objective_unit = self.dimensions.scaling.objective_unit;
         let is_final = self.has_rescaled_objective && !self.dimensions.in_restoration;

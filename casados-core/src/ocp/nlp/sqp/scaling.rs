@@ -173,7 +173,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
-    /// is far too large; from then on products of slacks and multipliers have a unit of their own.
+    /// is far too large; from then on products of slacks and multipliers have their own unit.
     /// Returns whether a unit has been replaced.
     pub(super) fn rescale_objective<P: Program<T>>(
         &mut self,

@@ -47,8 +47,8 @@ pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     FilterPair { objective: (objective + penalties + mu * barrier) / force, violation }
 }
 
-/// Returns the slope `∇φᵀ d`, and `Σ |∂f/∂v_i| |v_i|`, of which the rounding errors of the point
-/// are a part.
+/// Returns the slope `∇φᵀ d`, and `Σ |∂f/∂v_i| |v_i|`, the scale of the rounding errors of
+/// the point.
 pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
     iterate: &Iterate<'_, T>,
     mu: f64,

@@ -186,9 +186,9 @@ const MAX_REFINEMENTS: usize = 3;
 /// Refinement continues while it leaves at most this fraction of the residual of the equations.
 const REFINEMENT_GAIN: f64 = 0.5;
 
-/// Iterative refinement: removes the dual regularisation of equations from the step, up to
-/// rounding, with the same factors. Each solve starts from the last multipliers (proximal method of
-/// multipliers).
+/// Iterative refinement: removes the dual regularisation of equations from the step, up to a
+/// residual of `ε^(2/3)`, with the same factors. Each solve starts from the last multipliers
+/// (proximal method of multipliers).
 ///
 /// # Errors
 /// The errors of the recursion.
@@ -210,12 +210,12 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     Ok(())
 }
 
-/// The residual that refinement leaves in an equation, as a fraction of its value and unit.
+/// The residual at which refinement stops, `ε^(2/3)` of the value and unit of an equation.
 fn refined_equation_residual<T: Real>() -> f64 {
     Scalar::powf(T::EPSILON, 2.0 / 3.0)
 }
 
-/// Returns the residuals that full steps leave in equations: as a fraction of their values, and as
+/// Returns the residuals that refinement leaves in equations: as a fraction of their values, and as
 /// a sum in units. Zero without equations.
 pub(in crate::ocp::nlp::ipm) fn equation_residuals_after_step<T: Real>(
     iterate: &Iterate<'_, T>,
@@ -227,8 +227,8 @@ pub(in crate::ocp::nlp::ipm) fn equation_residuals_after_step<T: Real>(
     (residual, residual * sizes.sum::<f64>())
 }
 
-/// The largest residual of an equation after the full step, in units; zero if all are rounding
-/// errors.
+/// The largest residual of an equation after the full step, in units; zero if refinement
+/// stops.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let inequalities = &iterate.inequalities;
     let rounding = refined_equation_residual::<T>();

@@ -58,7 +58,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
 impl RunState<'_> {
     /// Replaces the objective unit by a smaller one, computed at the iterate, if that of the guess
-    /// is far too large; from then on products of slacks and multipliers have a unit of their own.
+    /// is far too large; from then on products of slacks and multipliers have their own unit.
     /// Returns whether a unit has been replaced.
     fn rescale_objective<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,

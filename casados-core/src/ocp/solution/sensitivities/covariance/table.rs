@@ -1,4 +1,4 @@
-//! An estimate as text.
+//! The table of an estimate with its standard deviations.
 
 use super::Covariance;
 use super::get;
@@ -6,8 +6,7 @@ use crate::scalar::Real;
 use core::fmt;
 
 /// Writes a row for each state, free parameter and control: its value and its standard deviation
-/// at the first stage and at its last one. Below them stand the directions that data say nothing
-/// of.
+/// at the first stage and at its last one. The unidentifiable directions follow.
 ///
 /// ```text
 ///         first stage                     last stage
@@ -22,7 +21,7 @@ impl<T: Real> fmt::Display for Covariance<T> {
         let width = names.clone().map(|name| name.chars().count()).max().unwrap_or(0).max(4);
         writeln!(f, "{:width$}  {:30}  last stage", "", "first stage")?;
         for (index, name) in names.enumerate() {
-            // Controls of the last stage are none.
+            // The last stage has no controls.
             let last = if index < nx + self.free.len() { intervals } else { intervals.saturating_sub(1) };
             let [first, last] = [0, last].map(|stage| stage * (nx + nu) + index);
             writeln!(f, "{name:width$}  {:30}  {}", self.cell(first), self.cell(last))?;
