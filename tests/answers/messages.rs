@@ -175,7 +175,7 @@ fn messages_about_vanishing_constraint_gradients() {
 
 /// Messages about a model without parameters, and about one reference (singular verb).
 #[test]
-fn of_what_there_is_none() -> Test {
+fn models_without_parameters() -> Test {
     let problem = Problem::new(casados::ocp::Map::<Push, f64>::new())
         .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]));
     let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;

@@ -137,7 +137,7 @@ fn multipliers_across_an_impact() -> Test {
 /// From guesses a tenth to three times the durations of flights. Equations determine the durations:
 /// steps from feasible points change only multipliers.
 #[test]
-fn flights_are_found_from_far() -> Test {
+fn distant_guesses_of_durations() -> Test {
     for guess in [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0] {
         for by_sqp in [false, true] {
             let mut flights = flight_problem(1, 6, guess)?;

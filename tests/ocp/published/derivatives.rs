@@ -74,7 +74,7 @@ fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) {
 
 /// Derivatives of the rocket by distance, speed, mass, end time and thrust.
 #[test]
-fn of_goddards_rocket() -> Test {
+fn derivatives_of_goddards_rocket() -> Test {
     const N: usize = 3;
     let mut ocp = Problem::new(Erk::<Rocket, Rk4>::new(Options { steps: 2, ..Options::default() })?)
         .terminal_cost(GeneralCost::<Depth>::new())
@@ -98,7 +98,7 @@ fn of_goddards_rocket() -> Test {
 
 /// Derivatives of the five substances by initial substances and rates; time in 1e4 minutes.
 #[test]
-fn of_pinene() -> Test {
+fn derivatives_of_pinene() -> Test {
     let times: Vec<f64> = SAMPLES.iter().map(|(time, _)| 1e-4 * time).collect();
     let mut ocp = Problem::new(Erk::<Pinene, Rk4>::new(Options { steps: 3, ..Options::default() })?)
         .stage_cost(GeneralCost::<Misfit>::new())

@@ -115,12 +115,12 @@ struct TrialPoint<T> {
 /// A phase and the link after it.
 struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
-    begin: PhaseStart,
+    start: PhaseStart,
     /// The names of the parameters shared with the phase before.
-    shares: Vec<&'a str>,
+    shared_names: Vec<&'a str>,
     link: Option<Box<dyn Link<T> + 'a>>,
     /// The start of the next phase.
-    next: Option<PhaseStart>,
+    next_start: Option<PhaseStart>,
     /// The index of its first stage in the joined problem.
     first: usize,
 }
@@ -186,7 +186,7 @@ impl<'a, T: Real> Phases<'a, T> {
     #[must_use]
     pub fn share(mut self, name: &'a str) -> Self {
         if let Some(last) = self.phases.last_mut() {
-            last.shares.push(name);
+            last.shared_names.push(name);
         }
         self
     }
@@ -206,7 +206,7 @@ impl<'a, T: Real> Phases<'a, T> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
         let mut decided: Vec<usize> =
-            self.phases.iter().map(|phase| phase.begin.start_variable_count()).collect();
+            self.phases.iter().map(|phase| phase.start.start_variable_count()).collect();
         decided.push(0);
         let mut decided = decided.into_iter();
         dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
@@ -214,7 +214,7 @@ impl<'a, T: Real> Phases<'a, T> {
             phase.first = dims.len();
             let phase_dims = phase.problem.qp().dims();
             try_reserve(&mut dims, phase_dims.len())?;
-            let (nx, free) = (phase.begin.size.nx, phase.begin.size.free);
+            let (nx, free) = (phase.start.size.nx, phase.start.size.free);
             dims.extend(phase_dims.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
                 last.nu = decided;
@@ -254,7 +254,7 @@ impl<'a, T: Real> Phases<'a, T> {
             phase.problem.check().map_err(|error| error.in_phase(index))?;
             let mut size = phase.problem.size();
             size.given_states = if index == 0 { size.given_states } else { size.model_states };
-            phase.begin = PhaseStart { size, shared: vec![None; size.free] };
+            phase.start = PhaseStart { size, shared: vec![None; size.free] };
         }
         self.initial_state = self.given_initial_state()?;
         let mut before: Option<&mut JoinedPhase<'_, T>> = None;
@@ -262,9 +262,9 @@ impl<'a, T: Real> Phases<'a, T> {
             phase.share_parameters(before.as_deref(), index)?;
             if let Some(before) = &mut before {
                 if let Some(link) = &before.link {
-                    link.check(before.problem.link_dims(phase.begin.size.model_states))?;
+                    link.check(before.problem.link_dims(phase.start.size.model_states))?;
                 }
-                before.next = Some(phase.begin.clone());
+                before.next_start = Some(phase.start.clone());
             }
             before = Some(phase);
         }
@@ -273,7 +273,9 @@ impl<'a, T: Real> Phases<'a, T> {
 
     /// Returns the fixed elements of the first state.
     fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
-        let Some(JoinedPhase { problem, begin, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let Some(JoinedPhase { problem, start: begin, .. }) = self.phases.first() else {
+            return Ok(Vec::new());
+        };
         let mut start = zeros(begin.size.given_states)?;
         if let Some(first) = problem.qp().stage(0) {
             copy_common(&mut start, first.x_bounds().lower);
@@ -292,7 +294,7 @@ impl<'a, T: Real> Phases<'a, T> {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
         let mut previous_stage = stages.next();
-        for (index, JoinedPhase { problem, begin, .. }) in self.phases.iter_mut().enumerate() {
+        for (index, JoinedPhase { problem, start: begin, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
                 if k == 0
                     && let Some(mut previous) = previous_stage.take()
@@ -319,11 +321,11 @@ impl<'a, T: Real> Phases<'a, T> {
     /// Writes the iterates of all phases to the iterate of the joined problem.
     fn store_iterates(&self, to: &mut HeapSolution<T>) {
         let first_stages =
-            || self.phases.iter().map(|phase| (&phase.begin, phase.problem.iterate().stages().next()));
+            || self.phases.iter().map(|phase| (&phase.start, phase.problem.iterate().stages().next()));
         let nexts = first_stages().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
             let next = next.and_then(|(begin, first)| Some((begin, first?)));
-            let size = phase.begin.size;
+            let size = phase.start.size;
             let stages = phase.problem.iterate().stages().enumerate();
             stages.map(move |(k, stage)| (size, stage, next.filter(|_| k == size.intervals)))
         });
@@ -340,7 +342,7 @@ impl<'a, T: Real> Phases<'a, T> {
     /// Reads a point of the joined problem to the iterates of the phases.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
-        for JoinedPhase { problem, begin, .. } in &mut self.phases {
+        for JoinedPhase { problem, start: begin, .. } in &mut self.phases {
             before = stage_conversion::load_phase(begin, &mut stages, problem.iterate_mut(), before);
         }
     }
@@ -351,8 +353,8 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
     {
-        let begin = PhaseStart { size: Phase::<T>::size(problem), shared: Vec::new() };
-        Self { problem, begin, shares: Vec::new(), link: None, next: None, first: 0 }
+        let start = PhaseStart { size: Phase::<T>::size(problem), shared: Vec::new() };
+        Self { problem, start, shared_names: Vec::new(), link: None, next_start: None, first: 0 }
     }
 
     /// Looks up the shared names among the free parameters of this phase and the phase before.
@@ -361,7 +363,7 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
     /// [`OcpError::Phase`]
     fn share_parameters(&mut self, before: Option<&Self>, phase: usize) -> Result<(), OcpError> {
         let names = self.problem.names();
-        for name in &self.shares {
+        for name in &self.shared_names {
             let mut is_found = false;
             let meant = names.p.iter().enumerate().filter(|(_, label)| name_matches(name, label));
             for (parameter, label) in meant {
@@ -371,7 +373,7 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
                     before.problem.free_index(of_before.iter().position(|other| other == label)?)
                 });
                 if let (Some(own), Some(other)) = (own, other)
-                    && let Some(shared) = self.begin.shared.get_mut(own)
+                    && let Some(shared) = self.start.shared.get_mut(own)
                 {
                     (*shared, is_found) = (Some(other), true);
                 }

@@ -91,9 +91,10 @@ pub(super) trait Phase<T: Real> {
     fn evaluate(&mut self, trial_point: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
     /// Whether the stages of its intervals are variables.
     fn is_lifted(&self) -> bool;
-    /// Sets the step length of lifted stages for the next evaluation; returns the sum and the
-    /// largest of the residuals of their equations.
-    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2];
+    /// Sets the step length of lifted stages for the next evaluation.
+    fn set_step_length(&mut self, step_length: Option<T>);
+    /// Returns the sum and the largest of the residuals of the equations of lifted stages.
+    fn stage_residuals(&self) -> [T; 2];
     fn initialise_stages(&mut self) -> Result<(), OcpError>;
     fn expand_stage_steps(&mut self, step: &HeapSolution<T>) -> Result<(), OcpError>;
     fn apply_stage_action(&mut self, action: StageAction<T>);
@@ -197,8 +198,10 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn is_lifted(&self) -> bool {
         P::Dynamics::LIFTED
     }
-    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2] {
+    fn set_step_length(&mut self, step_length: Option<T>) {
         self.step_length = step_length;
+    }
+    fn stage_residuals(&self) -> [T; 2] {
         self.stage_residuals
     }
     fn initialise_stages(&mut self) -> Result<(), OcpError> {

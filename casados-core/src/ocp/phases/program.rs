@@ -112,10 +112,10 @@ macro_rules! programs {
                 ends: &mut [$number],
             ) -> Result<$number, OcpError> {
                 let length = intervals_end(ocp.qp.dims());
-                ocp.problem.stage_residuals(ocp.step_length);
+                ocp.problem.set_step_length(ocp.step_length);
                 let objective =
                     ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())?;
-                ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
+                ocp.stage_residuals = ocp.problem.stage_residuals();
                 Ok(objective)
             }
 
@@ -130,7 +130,7 @@ macro_rules! programs {
             }
 
             fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
-                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.begin.size.intervals + 1);
+                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.start.size.intervals + 1);
                 core::iter::once(0..1).chain(phases)
             }
 
@@ -164,7 +164,7 @@ macro_rules! programs {
                 asks: bool,
             ) -> (bool, Option<(ConstraintName, f64)>) {
                 let Ocp { problem, iterate, step_length, .. } = ocp;
-                problem.stage_residuals(*step_length);
+                problem.set_step_length(*step_length);
                 problem.load(iterate.stages());
                 let (mut is_convex, mut worst) = (true, None);
                 for (index, phase) in problem.phases.iter_mut().enumerate() {
@@ -190,13 +190,13 @@ fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     kind: Kind,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
-    ocp.problem.stage_residuals(ocp.step_length);
+    ocp.problem.set_step_length(ocp.step_length);
     let mut objective = T::ZERO;
     for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
         objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
     }
     ocp.objective = objective;
-    ocp.stage_residuals = ocp.problem.stage_residuals(ocp.step_length);
+    ocp.stage_residuals = ocp.problem.stage_residuals();
     let Ocp { problem, qp, iterate, data, .. } = ocp;
     let rows = 2 * qp.dims().iter().map(|stage| stage.ng).sum::<usize>();
     let scratch = data.as_mut().get_mut(rows..).unwrap_or_default();
@@ -224,11 +224,11 @@ impl<T: Real> JoinedPhase<'_, T> {
         last_stage: &SolutionStage<'_, T>,
         starts: &mut &mut [T],
     ) -> Result<(), OcpError> {
-        let (Some(next), Some(link)) = (&self.next, &mut self.link) else { return Ok(()) };
+        let (Some(next), Some(link)) = (&self.next_start, &mut self.link) else { return Ok(()) };
         let start = take_mut(starts, next.size.nx + next.size.free);
         let Some(last) = trial.point.stages().next_back() else { return Ok(()) };
         link.value(self.problem.phase_end(last), part_mut(start, 0, next.size.given_states))?;
-        let previous_stage = last_stage.x.get(self.begin.size.nx..).unwrap_or_default();
+        let previous_stage = last_stage.x.get(self.start.size.nx..).unwrap_or_default();
         stage_conversion::write_start_state(next, last_stage.u, previous_stage, start);
         Ok(())
     }
@@ -271,11 +271,15 @@ fn write_link_to_qp<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
-    /// Sets the step length of lifted stages for the next evaluation; returns the sum and the
-    /// largest of the residuals of their equations.
-    fn stage_residuals(&mut self, step_length: Option<T>) -> [T; 2] {
-        let stages = self.phases.iter_mut().map(|phase| phase.problem.stage_residuals(step_length));
-        stages.fold([T::ZERO; 2], add_stage_residuals)
+    /// Sets the step length of lifted stages for the next evaluation.
+    fn set_step_length(&mut self, step_length: Option<T>) {
+        self.phases.iter_mut().for_each(|phase| phase.problem.set_step_length(step_length));
+    }
+
+    /// Returns the sum and the largest of the residuals of the equations of lifted stages.
+    fn stage_residuals(&self) -> [T; 2] {
+        let residuals = self.phases.iter().map(|phase| phase.problem.stage_residuals());
+        residuals.fold([T::ZERO; 2], add_stage_residuals)
     }
 
     /// Loads the stages of each phase as its trial point.
@@ -283,7 +287,7 @@ impl<T: Real> Phases<'_, T> {
         let mut previous_stage = stages.next();
         for (phase, trial) in self.phases.iter().zip(&mut self.trial_points) {
             previous_stage =
-                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+                stage_conversion::load_phase(&phase.start, &mut stages, &mut trial.point, previous_stage);
         }
     }
 
@@ -311,17 +315,19 @@ impl<T: Real> Phases<'_, T> {
         let (mut objective, mut stages) = (T::ZERO, trial_point.stages());
         let Phases { phases, trial_points, initial_state } = self;
         let mut previous_stage = stages.next();
-        if let (Some(JoinedPhase { begin, .. }), Some(start_variables)) = (phases.first(), previous_stage) {
+        if let (Some(JoinedPhase { start: begin, .. }), Some(start_variables)) =
+            (phases.first(), previous_stage)
+        {
             let first = take_mut(&mut ends, begin.size.nx + begin.size.free);
             copy_common(first, initial_state);
             stage_conversion::write_start_state(begin, start_variables.u, &[], first);
         }
         for (index, (phase, trial)) in phases.iter_mut().zip(trial_points).enumerate() {
             let last =
-                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+                stage_conversion::load_phase(&phase.start, &mut stages, &mut trial.point, previous_stage);
             let cost = phase.problem.evaluate(&trial.point, &mut trial.ends);
             objective = objective + cost.map_err(|error| error.in_phase(index))?;
-            write_ends(phase.begin.size, trial, &mut ends, &mut values);
+            write_ends(phase.start.size, trial, &mut ends, &mut values);
             if let Some(last) = &last {
                 phase.write_start(trial, last, &mut ends).map_err(|error| error.in_phase(index))?;
             }
@@ -345,10 +351,10 @@ impl<T: Real> Phases<'_, T> {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
             copy_common(offset, &self.initial_state);
-            stage_conversion::write_start_columns(&first.begin, [0, point.x.len()], matrix, ld);
+            stage_conversion::write_start_columns(&first.start, [0, point.x.len()], matrix, ld);
             begin += ld;
         }
-        for (index, JoinedPhase { problem, link, begin: phase, next, .. }) in
+        for (index, JoinedPhase { problem, link, start: phase, next_start: next, .. }) in
             self.phases.iter_mut().enumerate()
         {
             for (from, stage_point) in problem.qp().stages().zip(problem.iterate().stages()) {
@@ -384,10 +390,10 @@ impl<T: Real> Phases<'_, T> {
         let find_name = || {
             let found = self.at(stage);
             let has_start_variables =
-                found.is_none_or(|(_, phase)| stage == phase.first + phase.begin.size.intervals);
+                found.is_none_or(|(_, phase)| stage == phase.first + phase.start.size.intervals);
             let (number, place) = if has_start_variables && field == QpField::ControlBounds {
                 let number = found.map_or(0, |(number, _)| number + 1);
-                let begin = &self.phases.get(number)?.begin;
+                let begin = &self.phases.get(number)?.start;
                 let states = begin.size.free_start_states().len();
                 let state = (QpField::StateBounds, 0, begin.size.given_states + index);
                 let parameter = index
@@ -396,7 +402,7 @@ impl<T: Real> Phases<'_, T> {
                 (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
             } else {
                 let (number, phase) = found?;
-                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.begin.size);
+                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.start.size);
                 let place = match field {
                     QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
                     QpField::ControlBounds => (field, k, index + free),

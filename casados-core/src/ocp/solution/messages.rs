@@ -63,14 +63,14 @@ impl fmt::Display for ConstraintName {
             _ if self.point > 0 => write!(f, " at point {} inside of interval {}", self.point, self.stage)?,
             _ => write!(f, " at stage {}", self.stage)?,
         }
-        OfPhase(self.phase).fmt(f)
+        PhaseSuffix(self.phase).fmt(f)
     }
 }
 
 /// ` of phase 1`, or nothing.
-struct OfPhase<T>(Option<T>);
+struct PhaseSuffix<T>(Option<T>);
 
-impl<T: fmt::Display> fmt::Display for OfPhase<T> {
+impl<T: fmt::Display> fmt::Display for PhaseSuffix<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
             Some(phase) => write!(f, " of phase {phase}"),
@@ -181,10 +181,10 @@ impl fmt::Display for OcpError {
                 })
             }
             Self::NonFiniteFunction { function, stage, output, value, phase } => {
-                write!(f, "stage {stage}{}: output {output} of `{function}` is {value}: {OUTSIDE_DOMAIN}", OfPhase(*phase))
+                write!(f, "stage {stage}{}: output {output} of `{function}` is {value}: {OUTSIDE_DOMAIN}", PhaseSuffix(*phase))
             }
             Self::NonFiniteDerivative { field, stage, of, output, by, value, phase } => {
-                write!(f, "stage {stage}{}: ", OfPhase(*phase))?;
+                write!(f, "stage {stage}{}: ", PhaseSuffix(*phase))?;
                 match field {
                     QpField::A | QpField::B => write!(f, "the derivative of the next `{of}` by `{by}`")?,
                     QpField::C | QpField::D => write!(f, "the derivative of output {output} of `{of}` by `{by}`")?,
@@ -199,7 +199,7 @@ impl fmt::Display for OcpError {
                  costs to about one"
             ),
             Self::Integration { interval, error, phase } => {
-                write!(f, "interval {interval}{}: {error}", OfPhase(*phase))
+                write!(f, "interval {interval}{}: {error}", PhaseSuffix(*phase))
             }
             Self::Simulation { interval, state, value, error } => write!(
                 f,

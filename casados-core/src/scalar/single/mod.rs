@@ -1,7 +1,7 @@
-//! Elementary functions of `f32` without the standard library, for those that `libm` computes in
-//! `f64`, eight times slower on processors with a single-precision FPU, and for `exp`, whose run
-//! time in `libm` depends on the argument. No operation has double precision. The other functions
-//! of `libm` are in single precision.
+//! Elementary functions of `f32` without the standard library: the functions that `libm` computes
+//! in `f64`, which processors with a single-precision FPU emulate, and `exp`, whose run time in
+//! `libm` depends on the argument. No operation has double precision. The other functions of `libm`
+//! are in single precision.
 //!
 //! Bounds of the error in units in the last place of the exact result, for these functions and
 //! those of `libm`; tests compare with `f64` over all arguments, one in ten thousand, or one in a

@@ -204,15 +204,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let reference_violation = state.initial_violation.max(1.0);
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
-        let (equation_residual, of_equations) = equation_residuals_after_step(&iterate, work.units);
-        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + of_equations;
+        let (equation_residual, equation_residual_sum) = equation_residuals_after_step(&iterate, work.units);
+        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + equation_residual_sum;
         let objective_unit = state.dimensions.scaling.objective_unit;
-        let (slope, terms) = barrier_function::barrier_slope(&iterate, state.mu, work.scratch);
+        let (slope, gradient_terms) = barrier_function::barrier_slope(&iterate, state.mu, work.scratch);
         let expected = FilterModel {
             current: here,
             slope: slope / objective_unit,
             // Rounding errors of the function and of the point.
-            noise: 10.0 * f64::EPSILON * (here.objective.abs() + terms / objective_unit),
+            noise: 10.0 * f64::EPSILON * (here.objective.abs() + gradient_terms / objective_unit),
             theta_min: state.theta_min,
             max_violation: (MAX_VIOLATION_GROWTH * here.violation.min(reference_violation))
                 .max(reference_violation),

@@ -27,8 +27,9 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     let first =
         if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
     let mut inequalities = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
-    let ProblemScaling { objective_unit: force, min_row_unit: least } = lengths.scaling;
-    inequalities.dual_regularisation = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
+    let ProblemScaling { objective_unit, min_row_unit } = lengths.scaling;
+    inequalities.dual_regularisation =
+        T::from_f64(Scalar::sqrt(T::EPSILON) * min_row_unit * min_row_unit / objective_unit);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
     iterate.inequalities.equation_multiplier_steps = take_mut(&mut numbers, lengths.counts.equations);
     Ok(iterate)
@@ -48,9 +49,10 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
     iterate.inequalities.list(qp, &reading_options(qp));
-    let (equations, least) = (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.min_row_unit));
+    let (equations, min_row_unit) =
+        (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.min_row_unit));
     for (stiffness, &row) in iterate.inequalities.stiffness_scale.iter_mut().zip(equations) {
-        let ratio = least / at(units, row);
+        let ratio = min_row_unit / at(units, row);
         *stiffness = ratio * ratio;
     }
     Ok(iterate)
@@ -233,7 +235,7 @@ fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> 
     let inequalities = &iterate.inequalities;
     let rounding = refined_equation_residual::<T>();
     let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
-    let lacks = residuals.map(|(&row, &residual)| {
+    let remaining_residuals = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
         let residual_after_step = (residual + at(iterate.step, row)).abs().to_f64();
         if residual_after_step <= rounding * (unit + at(iterate.v, row).abs().to_f64()) {
@@ -242,7 +244,7 @@ fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> 
             residual_after_step / unit
         }
     });
-    lacks.fold(0.0, f64::max)
+    remaining_residuals.fold(0.0, f64::max)
 }
 
 struct RefineStep<'r, 'a, T> {
