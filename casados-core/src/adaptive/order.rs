@@ -82,17 +82,17 @@ impl OrderSelection {
 }
 
 /// The allocated methods of a family.
-pub struct Orders<M: Dae, T: Real> {
+pub struct MethodsByOrder<M: Dae, T: Real> {
     methods: [Option<Box<dyn StageSolver<M, T> + Send + Sync>>; 3],
 }
 
-impl<M: Dae, T: Real> Default for Orders<M, T> {
+impl<M: Dae, T: Real> Default for MethodsByOrder<M, T> {
     fn default() -> Self {
         Self { methods: [None, None, None] }
     }
 }
 
-impl<M: Dae, T: Real> Orders<M, T> {
+impl<M: Dae, T: Real> MethodsByOrder<M, T> {
     pub fn get<B: MethodFamily>(&mut self, level: usize) -> Result<&mut dyn StageSolver<M, T>, Error> {
         let missing = Error::OutOfMemory { bytes: 0 };
         let place = self.methods.get_mut(level).ok_or(missing)?;

@@ -112,7 +112,7 @@ pub use statistics::{QpStatistics, Residuals};
 // Exports for the optimal control problems.
 pub(crate) use coupling::{is_marked, marked_indices};
 pub(crate) use interior::{
-    Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
+    Columns, add_symmetric_product, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
 pub(crate) use layout::{StageOffsetsIter, copy_common, padded_len, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]

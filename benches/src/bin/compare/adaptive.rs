@@ -2,7 +2,7 @@
 
 use super::casadi::Casadi;
 use super::rows::{Measured, Timer, run_in_turn};
-use super::{Effort, Failure};
+use super::{MeasurementBudget, Failure};
 use casados::prelude::*;
 use casados_benches::case::{Case, Family, Mode};
 
@@ -16,7 +16,7 @@ pub struct SolverRow {
 }
 
 /// CVODES, IDAS and diffsol at a tolerance of 1e-8, and casados with a method of similar accuracy.
-pub fn measure_adaptive(casadi: &mut Casadi, effort: Effort) -> Result<Vec<SolverRow>, Failure> {
+pub fn measure_adaptive(casadi: &mut Casadi, effort: MeasurementBudget) -> Result<Vec<SolverRow>, Failure> {
     let mut problems = vec![("pendulum", Case::pendulum(Family::Gauss, 4, 1))];
     for (name, masses) in [("chain 3", 3), ("chain 5", 5), ("chain 7", 7)] {
         problems.push((name, Case::chain(masses, Family::Gauss, 4, 4)));

@@ -1,6 +1,6 @@
 //! The solvers of diffsol with step-size control, on the models that are explicit equations.
 
-use super::Effort;
+use super::MeasurementBudget;
 use super::rows::Measured;
 use casados_benches::case::{Case, Mode, Values};
 use casados_benches::time::measure as sample;
@@ -25,7 +25,7 @@ struct Model {
 pub fn measure(
     case: &Case,
     flow: &Values,
-    effort: Effort,
+    effort: MeasurementBudget,
 ) -> Vec<(&'static str, Mode, Result<Measured, String>)> {
     let model = match case.model {
         "pendulum" => Model { right_hand_side: pendulum, derivative: pendulum_derivative },

@@ -42,12 +42,12 @@ usage: cargo run --release --manifest-path benches/Cargo.toml [--features diffso
 
 /// How long a measurement lasts.
 #[derive(Clone, Copy)]
-pub struct Effort {
+pub struct MeasurementBudget {
     /// Seconds.
     pub seconds: f64,
 }
 
-impl Effort {
+impl MeasurementBudget {
     fn budget(self) -> Duration {
         Duration::from_secs_f64(self.seconds)
     }
@@ -55,7 +55,7 @@ impl Effort {
 
 struct Arguments {
     only: Option<String>,
-    effort: Effort,
+    effort: MeasurementBudget,
     peers: bool,
     out: PathBuf,
     write: Option<PathBuf>,
@@ -64,7 +64,7 @@ struct Arguments {
 fn arguments() -> Result<Arguments, Failure> {
     let mut all = Arguments {
         only: None,
-        effort: Effort { seconds: 0.3 },
+        effort: MeasurementBudget { seconds: 0.3 },
         peers: true,
         out: repository_path("plots/compare"),
         write: None,

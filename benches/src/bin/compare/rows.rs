@@ -3,7 +3,7 @@
 use super::acados::{self, Acados};
 use super::casadi::Casadi;
 use super::reference_times::ReferenceTimes;
-use super::{Effort, Failure};
+use super::{MeasurementBudget, Failure};
 use casados::prelude::*;
 use casados_benches::calls::{BatchCalls, IntegratorCalls, open_batch, open_calls, options};
 use casados_benches::case::{Case, Family, Mode};
@@ -96,7 +96,7 @@ fn is_affordable(case: &Case, mode: Mode) -> bool {
 }
 
 /// All questions to one case, the peers and casados in turn.
-pub fn measure_case(case: &Case, peers: &mut Peers, effort: Effort) -> Result<Vec<Row>, Failure> {
+pub fn measure_case(case: &Case, peers: &mut Peers, effort: MeasurementBudget) -> Result<Vec<Row>, Failure> {
     let mut case = case.clone();
     let modes: Vec<Mode> = Mode::ALL_MODES.into_iter().filter(|m| is_affordable(&case, *m)).collect();
     if case.reference.is_none()
@@ -127,7 +127,7 @@ impl<'a> PeerTimer<'a> {
         Some(Self { column, ask, first, rounds: Vec::new() })
     }
 
-    fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+    fn round(&mut self, effort: MeasurementBudget) -> Result<(), Failure> {
         self.rounds.push((self.ask)(effort.seconds / ROUNDS as f64)?.time);
         Ok(())
     }
@@ -157,7 +157,7 @@ fn ask_all_peers<'a>(case: &'a Case, mode: Mode, peers: &'a mut Peers) -> Vec<Pe
     all
 }
 
-fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Result<Row, Failure> {
+fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: MeasurementBudget) -> Result<Row, Failure> {
     let warm = case.family != Family::Rk4;
     let single = 0..case.single;
     let mut timers = vec![
@@ -243,7 +243,7 @@ impl Timer {
         Self { keeps_results: true, ..self }
     }
 
-    pub fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+    pub fn round(&mut self, effort: MeasurementBudget) -> Result<(), Failure> {
         let budget = effort.budget() / ROUNDS as u32;
         let Self { calls, mode, inputs, keeps_results: keeps, .. } = &mut *self;
         let time = if *keeps {
@@ -284,7 +284,7 @@ impl BatchTimer {
         Ok(Some(Self { calls, mode, count: case.inputs.len(), error, rounds: Vec::new() }))
     }
 
-    fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+    fn round(&mut self, effort: MeasurementBudget) -> Result<(), Failure> {
         let time = measure(effort.budget() / ROUNDS as u32, || self.calls.call(self.mode));
         self.rounds.push(time.map_err(|e| e.to_string())?.divided(self.count as f64));
         Ok(())
@@ -296,7 +296,7 @@ impl BatchTimer {
 }
 
 /// All in turn.
-pub fn run_in_turn(mut timers: Vec<Timer>, effort: Effort) -> Result<Vec<Measured>, Failure> {
+pub fn run_in_turn(mut timers: Vec<Timer>, effort: MeasurementBudget) -> Result<Vec<Measured>, Failure> {
     for _ in 0..ROUNDS {
         timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
     }

@@ -1,7 +1,7 @@
 //! The [`Engine`] of a family of implicit methods.
 
 use crate::adaptive::engine::{Engine, MethodState};
-use crate::adaptive::order::{MethodFamily, Orders, interpolate_step};
+use crate::adaptive::order::{MethodFamily, MethodsByOrder, interpolate_step};
 use crate::adaptive::step::{AfterStep, Run, Span};
 use crate::adaptive::tape::TapeEntry;
 use crate::error::Error;
@@ -11,13 +11,13 @@ use crate::scalar::Real;
 
 /// The memory of a family: its steps, and their derivatives.
 pub struct ImplicitState<M: Dae, B: MethodFamily, T: Real> {
-    orders: Orders<M, T>,
+    orders: MethodsByOrder<M, T>,
     differentiator: B::Differentiator<M, T>,
 }
 
 impl<M: Dae, B: MethodFamily, T: Real> Default for ImplicitState<M, B, T> {
     fn default() -> Self {
-        Self { orders: Orders::default(), differentiator: Default::default() }
+        Self { orders: MethodsByOrder::default(), differentiator: Default::default() }
     }
 }
 

@@ -25,7 +25,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::OutOfMemory`]
     pub(super) fn choose_order<B: MethodFamily>(
         &mut self,
-        levels: &mut Orders<M, T>,
+        levels: &mut MethodsByOrder<M, T>,
         state: &mut StepState<T>,
     ) -> Result<(), Error> {
         let ratio = state.last_step_size.map(|before| (state.h / before).to_f64());

@@ -9,7 +9,7 @@ mod state;
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::newton_monitor::{NewtonFailure, THET};
 use crate::adaptive::options::AdaptiveOptions;
-use crate::adaptive::order::{MethodFamily, Orders, interpolate_step};
+use crate::adaptive::order::{MethodFamily, MethodsByOrder, interpolate_step};
 use crate::adaptive::point::ModelPoint;
 use crate::adaptive::stages::{StageSolver, StepContext};
 use crate::adaptive::statistics::AdaptiveStatistics;
@@ -152,7 +152,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// No consistent start; the errors that end a run.
     pub fn integrate<B: MethodFamily>(
         &mut self,
-        levels: &mut Orders<M, T>,
+        levels: &mut MethodsByOrder<M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
         after: AfterStep<'_, M, T>,

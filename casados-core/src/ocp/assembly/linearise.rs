@@ -22,7 +22,7 @@ use crate::ocp::formulation::instance::data::{
 use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::qp::{Arrays, StageDims, add_symmetric, copy_common, padded_len, part, part_mut};
+use crate::qp::{Arrays, StageDims, add_symmetric_product, copy_common, padded_len, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -275,7 +275,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let product = part_mut(data.scratch, 0, stage_ld);
             product.fill(T::ZERO);
-            add_symmetric(product, hessian, stage_ld, part(v, k * ld, stage_ld), n);
+            add_symmetric_product(product, hessian, stage_ld, part(v, k * ld, stage_ld), n);
             for (gradient, &product) in gradient.iter_mut().zip(&*product) {
                 *gradient = *gradient - product;
             }
@@ -291,7 +291,7 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
         for mut stage in self.qp.stages_mut() {
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
             gradient.fill(T::ZERO);
-            add_symmetric(gradient, hessian, ld, part(v, begin, ld), n);
+            add_symmetric_product(gradient, hessian, ld, part(v, begin, ld), n);
             gradient.iter_mut().for_each(|g| *g = T::ZERO - *g);
             begin += ld;
         }

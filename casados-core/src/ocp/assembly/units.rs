@@ -10,7 +10,8 @@ use crate::ocp::formulation::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_initial_state_fixed};
 use crate::qp::{
-    Bounds, QpView, StageDims, StageOffsetsIter, add_symmetric, copy_common, is_marked, part, part_mut,
+    Bounds, QpView, StageDims, StageOffsetsIter, add_symmetric_product, copy_common, is_marked, part,
+    part_mut,
 };
 use crate::scalar::Real;
 use core::ops::Range as Stages;
@@ -312,7 +313,7 @@ fn largest_gradient_and_change<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], 
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
         copy_common(gradient, part(view.gradient, 0, place.ld));
-        add_symmetric(gradient, view.hessian, place.ld, v, place.n);
+        add_symmetric_product(gradient, view.hessian, place.ld, v, place.n);
         let curvatures = view.hessian.iter().step_by(place.ld + 1);
         let fixed_states = if fixed && place.stage == 0 { place.nx } else { 0 };
         let units = part(rows, place.row, place.n);

@@ -6,7 +6,7 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::split_data;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{Residuals, Solution, StageDims, add_symmetric, part, part_mut};
+use crate::qp::{Residuals, Solution, StageDims, add_symmetric_product, part, part_mut};
 use crate::scalar::Real;
 
 /// The test for divergence of real-time iterations.
@@ -301,7 +301,7 @@ fn step_curvature<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T
             *d = w - v;
         }
         hessian_times_step.fill(T::ZERO);
-        add_symmetric(hessian_times_step, view.hessian, view.ld, step, view.n);
+        add_symmetric_product(hessian_times_step, view.hessian, view.ld, step, view.n);
         curvature = curvature + dot(hessian_times_step, step);
     }
     curvature.to_f64()

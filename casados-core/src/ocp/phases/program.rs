@@ -13,7 +13,7 @@ use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact, GaussNewton};
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::qp::{
-    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, check,
+    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric_product, check,
     copy_common, part, part_mut, take_mut,
 };
 use crate::scalar::Real;
@@ -258,13 +258,13 @@ fn write_link_to_qp<T: Real>(
     stage_conversion::write_start_columns(begin, [size.nx, variable_count], columns, ld);
     if exact {
         // The gradient at zero is `∇f − H v`; it changes with `H`.
-        add_symmetric(gradient, hessian, ld, v, n);
+        add_symmetric_product(gradient, hessian, ld, v, n);
         let mut terms = QuadraticTerms { free: end.free, gradient: &mut [], hessian, ld };
         link.add_hessian(end, part(pi, 0, next.given_states), &mut terms);
         convexify(convexification, hessian, ld, variable_count, scratch);
         let product = part_mut(scratch, 0, ld);
         product.fill(T::ZERO);
-        add_symmetric(product, hessian, ld, v, n);
+        add_symmetric_product(product, hessian, ld, v, n);
         gradient.iter_mut().zip(&*product).for_each(|(g, &product)| *g = *g - product);
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::plan::{CondensedRow, blocks};
 use crate::qp::element::{get, set};
-use crate::qp::interior::{Columns, add_symmetric, add_transposed, subtract, symmetric};
+use crate::qp::interior::{Columns, add_symmetric_product, add_transposed, subtract, symmetric};
 use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
@@ -117,7 +117,7 @@ pub fn stage_cost_and_product<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut
         let data = part(qp.data, place.data, place.data_len());
         let (v, product) = (part(v, place.v, place.ld), part_mut(product, 0, place.ld));
         product.fill(T::ZERO);
-        add_symmetric(product, part(data, place.matrix(), place.hessian()), place.ld, v, place.n);
+        add_symmetric_product(product, part(data, place.matrix(), place.hessian()), place.ld, v, place.n);
         for ((&v, &product), &linear) in v.iter().zip(&*product).zip(part(data, place.gradient(), place.n)) {
             sum += v.to_f64() * (0.5 * product.to_f64() + linear.to_f64());
         }

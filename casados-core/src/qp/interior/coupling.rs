@@ -21,9 +21,9 @@ pub struct CouplingSupport;
 pub enum CouplingSupport {}
 
 #[cfg(feature = "alloc")]
-const EXISTS: Option<CouplingSupport> = Some(CouplingSupport);
+const COUPLING_SUPPORT: Option<CouplingSupport> = Some(CouplingSupport);
 #[cfg(not(feature = "alloc"))]
-const EXISTS: Option<CouplingSupport> = None;
+const COUPLING_SUPPORT: Option<CouplingSupport> = None;
 
 /// The data of couplings, in memory of the caller.
 pub struct Coupling<'a, T> {
@@ -83,7 +83,7 @@ impl<'a, T: Real> Coupling<'a, T> {
 
     /// Returns the length of the memory for a QP.
     pub fn memory_of(qp: QpView<'_, T>) -> usize {
-        if EXISTS.is_none() {
+        if COUPLING_SUPPORT.is_none() {
             return 0;
         }
         let (conditions, shared) =
@@ -104,7 +104,7 @@ impl<'a, T: Real> Coupling<'a, T> {
         if count == 0 {
             return None;
         }
-        let _exists = EXISTS?;
+        let _exists = COUPLING_SUPPORT?;
         let (v, nx, ld) = (extent.end.v, first_nx(qp.dims), padded_len::<T>(count));
         let n = nx + count;
         Some(Self {

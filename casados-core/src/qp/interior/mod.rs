@@ -28,7 +28,7 @@ mod verdict;
 
 pub(crate) use iterate::{Iterate, at};
 pub(crate) use kernels::{
-    Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
+    Columns, add_symmetric_product, add_transposed, scale, splat, subtract, subtract_column, symmetric,
 };
 #[cfg(feature = "alloc")]
 pub(super) use kernels::{PADDING_COLUMNS, Part, Source, product};

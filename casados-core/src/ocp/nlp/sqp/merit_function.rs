@@ -6,7 +6,9 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::element::get;
-use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, copy_common, part, part_mut};
+use crate::qp::{
+    Bounds, Solution, SolutionStage, StageDims, add_symmetric_product, copy_common, part, part_mut,
+};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -28,7 +30,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 *d = w - v;
             }
             copy_common(gradient, part(view.gradient, 0, view.ld));
-            add_symmetric(gradient, view.hessian, view.ld, v, view.n);
+            add_symmetric_product(gradient, view.hessian, view.ld, v, view.n);
             slope = gradient.iter().zip(&*direction).fold(slope, |sum, (&g, &d)| sum + g * d);
             let x = |i: usize| point.x.get(i).copied().unwrap_or(T::ZERO);
             let u = |i: usize| point.u.get(i).copied().unwrap_or(T::ZERO);
@@ -58,7 +60,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 *d = w - v;
             }
             hessian_product.fill(T::ZERO);
-            add_symmetric(hessian_product, view.hessian, view.ld, direction, view.n);
+            add_symmetric_product(hessian_product, view.hessian, view.ld, direction, view.n);
             for (&d, &f) in direction.iter().zip(&*hessian_product).take(view.n) {
                 (curvature, square) = (curvature + d * f, square + d * d);
             }

@@ -16,7 +16,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric, part};
+use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric_product, part};
 use crate::scalar::Real;
 
 /// `ε`
@@ -81,7 +81,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
             let stage_variables = part(v, begin, ld);
             begin += ld;
-            add_symmetric(gradient, hessian, ld, stage_variables, n);
+            add_symmetric_product(gradient, hessian, ld, stage_variables, n);
             gradient.iter_mut().for_each(|g| *g = gradient_factor * *g);
             hessian.fill(T::ZERO);
             let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);

@@ -9,7 +9,8 @@ mod vectors;
 
 pub use product::{PADDING_COLUMNS, Part, Source, product, subtract};
 pub use vectors::{
-    add, add_symmetric, add_transposed, copy, copy_negative, mirror, scale, subtract_column, symmetric,
+    add, add_symmetric_product, add_transposed, copy, copy_negative, mirror, scale, subtract_column,
+    symmetric,
 };
 
 use crate::scalar::{Packed, Real};

@@ -116,7 +116,7 @@ fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
 }
 
 /// Computes `target + H v` as [`symmetric`], for callers outside a SIMD kernel.
-pub fn add_symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+pub fn add_symmetric_product<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     T::registers(AddSymmetric { target, h, ld, v, n });
 }
 
@@ -257,7 +257,7 @@ mod tests {
             (0..n).for_each(|j| h[j * ld..j * ld + j].fill(f64::NAN));
             let mut target = before.clone();
             if padding == 0 {
-                add_symmetric(&mut target, &h, ld, &v, n);
+                add_symmetric_product(&mut target, &h, ld, &v, n);
             } else {
                 symmetric::<f64, f64>(&mut target, &h, ld, &v, n);
             }

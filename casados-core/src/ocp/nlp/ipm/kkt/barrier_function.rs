@@ -7,7 +7,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::interior::{Inequalities, Iterate};
-use crate::qp::{Solution, StageDims, StageOffsetsIter, add_symmetric, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, add_symmetric_product, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// Returns `Σ λ_e e + ½ q e²` over violations of soft bounds, and `−Σ log` over slacks and
@@ -59,7 +59,13 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
         let view = stage.arrays();
         let gradient = part_mut(scratch, 0, place.ld);
         copy_common(gradient, part(view.gradient, 0, place.ld));
-        add_symmetric(gradient, view.hessian, place.ld, part(iterate.v, place.row, place.ld), place.n);
+        add_symmetric_product(
+            gradient,
+            view.hessian,
+            place.ld,
+            part(iterate.v, place.row, place.ld),
+            place.n,
+        );
         let (step, v) = (part(iterate.step, place.row, place.n), part(iterate.v, place.row, place.n));
         for ((&g, &d), &v) in gradient.iter().zip(step).zip(v) {
             (slope, terms) = (slope + g * d, terms + (g * v).abs());
