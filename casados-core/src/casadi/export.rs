@@ -91,9 +91,9 @@ macro_rules! __casadi_export_problem {
     };
     ($name:ident = $make:path) => {
         const _: () = {
-            static LIBRARY: $crate::casadi::Library<$crate::casadi::ProblemFunctions> =
+            static LIBRARY: $crate::casadi::Library<$crate::casadi::Problems> =
                 $crate::casadi::Library::new(|| {
-                    Ok($crate::casadi::ProblemFunctions::new(|| Ok(::std::boxed::Box::new($make()?))))
+                    Ok($crate::casadi::Problems::new(|| Ok(::std::boxed::Box::new($make()?))))
                 });
             $crate::__casadi_function!(LIBRARY, 0, "", $name, "");
             $crate::__casadi_function!(LIBRARY, 1, "", $name, "_f");

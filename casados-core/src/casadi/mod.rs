@@ -74,5 +74,5 @@ pub use self::{
     integrators::{Integrators, Settings},
     interval::Interval,
     library::Library,
-    problem::ProblemFunctions,
+    problem::Problems,
 };

@@ -25,7 +25,7 @@ pub type ProgramConstructor = fn() -> Result<Box<dyn Program>, Box<dyn core::err
 /// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
 /// `jac_adj1_nlp`, `nlp_trajectory`.
 #[doc(hidden)]
-pub struct ProblemFunctions {
+pub struct Problems {
     make: ProgramConstructor,
     layout: Layout,
     signatures: Vec<Signature>,
@@ -74,7 +74,7 @@ struct PointCache {
 
 const CONSTRUCTION_FAILED: &str = "the problem could not be made";
 
-impl ProblemFunctions {
+impl Problems {
     /// The functions of the problem that `make` creates.
     #[must_use]
     pub fn new(make: ProgramConstructor) -> Self {
@@ -197,7 +197,7 @@ impl ProblemFunctions {
     }
 }
 
-impl FunctionLibrary for ProblemFunctions {
+impl FunctionLibrary for Problems {
     type Worker = Worker;
 
     fn signatures(&self) -> &[Signature] {
@@ -275,7 +275,7 @@ impl FunctionLibrary for ProblemFunctions {
     }
 }
 
-impl ProblemFunctions {
+impl Problems {
     /// Computes and writes an output; writes IPOPT's Hessian in place.
     fn compute_output(&self, worker: &mut Worker, port: &Port, to: &mut [f64]) -> Result<(), OcpError> {
         match port.name.to_bytes() {
