@@ -2,7 +2,7 @@
 
 use super::casadi::Casadi;
 use super::rows::{Measured, Timer, run_in_turn};
-use super::{MeasurementBudget, Failure};
+use super::{Failure, MeasurementBudget};
 use casados::prelude::*;
 use casados_benches::case::{Case, Family, Mode};
 

@@ -2,7 +2,7 @@
 
 use super::casadi::Casadi;
 use super::rows::{Measured, Timer, run_in_turn};
-use super::{MeasurementBudget, Failure};
+use super::{Failure, MeasurementBudget};
 use casados::prelude::*;
 use casados_benches::case::{Case, Family, Mode};
 use casados_benches::time::log_log_slope;
@@ -16,7 +16,12 @@ pub struct ScalingWithSize {
 }
 
 impl ScalingWithSize {
-    pub fn measure(masses: &[usize], stages: usize, steps: usize, effort: MeasurementBudget) -> Result<Self, Failure> {
+    pub fn measure(
+        masses: &[usize],
+        stages: usize,
+        steps: usize,
+        effort: MeasurementBudget,
+    ) -> Result<Self, Failure> {
         let cases: Vec<_> = masses.iter().map(|m| Case::chain(*m, Family::Gauss, stages, steps)).collect();
         let questions = cases.iter().flat_map(|case| Mode::ALL_MODES.map(|mode| (case, mode)));
         let timers = questions.map(|(case, mode)| Timer::new(case, 1e-8, Start::Zero, mode, 0..1));
@@ -46,7 +51,10 @@ pub struct Precision {
 }
 
 /// A chain of 5 masses: Gauss-Legendre with 1 to 5 stages, 1 to 8 steps.
-pub fn work_precision(casadi: &mut Casadi, effort: MeasurementBudget) -> Result<(Vec<Precision>, f64), Failure> {
+pub fn work_precision(
+    casadi: &mut Casadi,
+    effort: MeasurementBudget,
+) -> Result<(Vec<Precision>, f64), Failure> {
     let (flow, uncertainty) = casadi.exact_flow(&Case::chain(5, Family::Gauss, 4, 1))?;
     let mut methods = Vec::new();
     let mut timers = Vec::new();

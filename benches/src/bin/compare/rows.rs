@@ -3,7 +3,7 @@
 use super::acados::{self, Acados};
 use super::casadi::Casadi;
 use super::reference_times::ReferenceTimes;
-use super::{MeasurementBudget, Failure};
+use super::{Failure, MeasurementBudget};
 use casados::prelude::*;
 use casados_benches::calls::{BatchCalls, IntegratorCalls, open_batch, open_calls, options};
 use casados_benches::case::{Case, Family, Mode};
@@ -157,7 +157,12 @@ fn ask_all_peers<'a>(case: &'a Case, mode: Mode, peers: &'a mut Peers) -> Vec<Pe
     all
 }
 
-fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: MeasurementBudget) -> Result<Row, Failure> {
+fn measure_row(
+    case: &Case,
+    mode: Mode,
+    peers: &mut Peers,
+    effort: MeasurementBudget,
+) -> Result<Row, Failure> {
     let warm = case.family != Family::Rk4;
     let single = 0..case.single;
     let mut timers = vec![
