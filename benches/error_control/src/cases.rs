@@ -32,7 +32,7 @@ impl Case {
 /// One of a random family, by the parameters of the few models.
 pub fn random(family: &'static str, seed: u64) -> Case {
     let problem = problems::problem(family, seed);
-    let breaks = problem.breaks();
+    let breaks = problem.discontinuity_times();
     let q = &problem.p;
     let mut x0 = problem.x0;
     let p = match family {

@@ -18,6 +18,7 @@ mod models;
 #[allow(dead_code)]
 mod plants;
 #[path = "../../src/bin/random_problems/problems.rs"]
+#[allow(dead_code)] // Families are chosen by name here.
 mod problems;
 #[path = "../../src/bin/random_problems/models.rs"]
 #[allow(dead_code)]

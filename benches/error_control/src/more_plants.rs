@@ -43,17 +43,16 @@ pub mod equations {
         let mut slope = [0.0; 36];
         for i in 0..6 {
             let (mut numerator, mut square) = (0.0, 0.0);
-            let mut force = [0.0; 3];
-            for axis in 0..3 {
+            let force = [0, 1, 2].map(|axis| repulsion(x, i, axis) - 0.5 * x[18 + 3 * i + axis]);
+            for (axis, force) in force.iter().enumerate() {
                 let k = 3 * i + axis;
-                force[axis] = repulsion(x, i, axis) - 0.5 * x[18 + k];
-                numerator += x[18 + k] * x[18 + k] + x[k] * force[axis];
+                numerator += x[18 + k] * x[18 + k] + x[k] * force;
                 square += x[k] * x[k];
             }
-            for axis in 0..3 {
+            for (axis, force) in force.iter().enumerate() {
                 let k = 3 * i + axis;
                 slope[k] = x[18 + k];
-                slope[18 + k] = force[axis] - numerator / square * x[k];
+                slope[18 + k] = force - numerator / square * x[k];
             }
         }
         slope

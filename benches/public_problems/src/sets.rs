@@ -1,7 +1,7 @@
 //! The sets: public problems, the twenty of `examples/models/ocps`, and variations of these.
 
 use crate::ocps::{self, Failure, Grid};
-use crate::variations::{GIVEN, VARIATIONS, Variation};
+use crate::variations::{ORIGINAL, VARIATIONS, Variation};
 use crate::{Entry, Facts, families};
 use casados::ocp::{Formulation, HeapOcp, SecondOrder};
 
@@ -19,7 +19,7 @@ where
     let facts = Facts { name, source, published: None, precision: 0.0, tags: &["tuned on"] };
     Entry::new(facts, move || {
         let mut ocp = make(variation.grid)?;
-        variation.apply(&mut ocp)?;
+        variation.apply_variation(&mut ocp)?;
         Ok(ocp)
     })
 }
@@ -37,7 +37,7 @@ ocps::each_ocp!(entries);
 #[must_use]
 pub fn collection() -> Vec<Entry> {
     let mut entries = Vec::new();
-    of_collection(&GIVEN, &mut entries);
+    of_collection(&ORIGINAL, &mut entries);
     entries
 }
 
@@ -60,7 +60,7 @@ pub fn public() -> Vec<Entry> {
 /// Every problem.
 #[must_use]
 pub fn all() -> Vec<Entry> {
-    [public(), families::unseen::all(), collection(), variations()].into_iter().flatten().collect()
+    [public(), collection(), variations()].into_iter().flatten().collect()
 }
 
 /// A set by its name.
@@ -72,7 +72,6 @@ pub fn named(name: &str) -> Result<Vec<Entry>, Failure> {
         "public" => Ok(public().into_iter().filter(|entry| !entry.facts.is_held_out()).collect()),
         "held-out" => Ok(public().into_iter().filter(|entry| entry.facts.is_held_out()).collect()),
         "collection" => Ok(collection()),
-        "unseen" => Ok(families::unseen::all()),
         "variations" => Ok(variations()),
         _ => Err(format!("{name} is none of public, held-out, collection, variations").into()),
     }

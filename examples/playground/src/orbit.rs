@@ -70,8 +70,8 @@ fn solve() -> Result<(), Box<dyn Error>> {
     let guess = [(0..=INTERVALS).map(node).collect(), controls.chunks(NU).map(<[f64]>::to_vec).collect()];
     let options = Options { start: Start::Zero, ..Default::default() };
     let dynamics = Shooting::new(Batch::<Awe, RadauIIA<4>>::new(options)?);
-    let mut ocp = problem::orbit(dynamics, given[0])?;
-    problem::begin(&mut ocp, &guess)?;
+    let mut ocp = problem::orbit_problem(dynamics, given[0])?;
+    problem::set_iterate(&mut ocp, &guess)?;
     let mut ipm = HeapIpm::new(&ocp)?;
     let begin = now();
     let end = ipm.solve_observed(&mut ocp, &mut |row| {

@@ -6,7 +6,6 @@
 //! ```
 
 #[path = "../../../../examples/models/ivp/mod.rs"]
-#[allow(dead_code)]
 mod models;
 #[path = "../more_plants.rs"]
 mod more_plants;

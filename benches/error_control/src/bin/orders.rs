@@ -6,7 +6,6 @@
 //! ```
 
 #[path = "../../../../examples/models/ivp/mod.rs"]
-#[allow(dead_code)]
 mod models;
 
 use casados::{Adaptive, AdaptiveOptions, Radau, RadauIIA};

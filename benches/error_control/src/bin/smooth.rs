@@ -8,7 +8,6 @@
 //! References are the values of `tests/data/ivp` and closed forms; Arenstorf's orbit is periodic.
 
 #[path = "../../../../examples/models/ivp/mod.rs"]
-#[allow(dead_code)]
 mod models;
 
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, ode};

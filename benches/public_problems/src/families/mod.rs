@@ -7,7 +7,6 @@ mod flight;
 mod processes;
 mod robots;
 mod textbook;
-pub mod unseen;
 
 use crate::{Entry, Failure};
 use casados::ocp::{Formulation, HeapOcp, Horizon};

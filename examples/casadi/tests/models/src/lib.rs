@@ -1,8 +1,8 @@
 //! Models of the tests: every kind of integrator, and the calls of Rust beside them.
 
+mod mass_on_table;
 mod problem;
 mod reference;
-mod slider;
 mod voyage;
 
 use casados::prelude::*;
