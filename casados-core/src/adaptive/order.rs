@@ -18,8 +18,6 @@ const FAST_CONTRACTION_RATE: f64 = 0.01;
 const SLOW_CONTRACTION_RATE: f64 = 0.8;
 /// The number of stages increases only if the ratio of step sizes is in this range.
 const STEADY_STEP_RATIO: (f64, f64) = (0.8, 1.2);
-/// Minimum number of steps before the number of stages increases.
-const MIN_STEPS_BEFORE_INCREASE: usize = 5;
 
 /// The methods among which an integrator selects.
 pub trait MethodFamily: 'static {
@@ -40,10 +38,10 @@ pub trait MethodFamily: 'static {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OrderSelection {
     pub order_index: usize,
+    /// The number of methods.
+    order_count: usize,
     /// The contraction rate of Newton's method.
     contraction_rate: f64,
-    /// The number of steps with the present order.
-    steps_with_order: usize,
     /// Whether an iteration did not converge, or a matrix was singular.
     pub iteration_failed: bool,
     /// Whether a slow iteration reduced the step to half or less.
@@ -51,33 +49,32 @@ pub struct OrderSelection {
 }
 
 impl OrderSelection {
-    /// The level for the next matrix, of a step that is `ratio` times as long as the last one.
-    pub fn select_order(&mut self, convergence: &NewtonMonitor, ratio: f64, levels: usize) -> usize {
-        self.steps_with_order += 1;
+    /// The lowest of this number of orders.
+    pub fn lowest(order_count: usize) -> Self {
+        Self { order_count, ..Self::default() }
+    }
+
+    /// Whether the order may increase after a step: it is not the highest one, and the iteration
+    /// has measured a contraction rate.
+    pub fn may_increase(&self, convergence: &NewtonMonitor) -> bool {
+        self.order_index + 1 < self.order_count && convergence.iterations > 1
+    }
+
+    /// The order for the next matrix, of a step that is `ratio` times as long as the last one.
+    pub fn select_order(&mut self, convergence: &NewtonMonitor, ratio: f64) -> usize {
         self.contraction_rate = convergence.contraction_rate.max(0.5 * self.contraction_rate).min(10.0);
         let steady = ratio > STEADY_STEP_RATIO.0 && ratio < STEADY_STEP_RATIO.1;
-        let easy = convergence.iterations > 1 && self.contraction_rate <= FAST_CONTRACTION_RATE;
+        let easy = self.may_increase(convergence) && self.contraction_rate <= FAST_CONTRACTION_RATE;
         let hard =
             self.contraction_rate >= SLOW_CONTRACTION_RATE || self.iteration_failed || self.step_was_halved;
         (self.iteration_failed, self.step_was_halved) = (false, false);
         if hard {
             self.order_index.saturating_sub(1)
-        } else if easy && steady && self.steps_with_order > MIN_STEPS_BEFORE_INCREASE {
-            (self.order_index + 1).min(levels - 1)
+        } else if easy && steady {
+            self.order_index + 1
         } else {
             self.order_index
         }
-    }
-
-    /// Counts a step with the matrix of the last one; returns whether a higher order justifies a
-    /// new matrix.
-    pub fn may_increase_order(&mut self, levels: usize) -> bool {
-        self.steps_with_order += 1;
-        self.steps_with_order >= MIN_STEPS_BEFORE_INCREASE && self.order_index + 1 < levels
-    }
-
-    pub fn set_order(&mut self, level: usize) {
-        (self.order_index, self.steps_with_order) = (level, 1);
     }
 }
 

@@ -31,10 +31,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let ratio = state.last_step_size.map(|before| (state.h / before).to_f64());
         if state.matrix_update >= MatrixUpdate::Factors {
             let level = state.order.order_index;
-            let next = state.order.select_order(&state.newton, ratio.unwrap_or(1.0), B::ORDER_COUNT);
+            let next = state.order.select_order(&state.newton, ratio.unwrap_or(1.0));
             if next != level {
                 levels.transfer_last_step::<B>(level, next)?;
-                state.order.set_order(next);
+                state.order.order_index = next;
                 state.controller.reset();
                 self.set_estimator_tolerances::<B>(levels.get::<B>(next)?.stage_count());
             }
@@ -55,7 +55,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// A Jacobian that is not finite; matrices that remain singular.
-    pub(super) fn prepare_factors<B: MethodFamily>(
+    pub(super) fn prepare_factors(
         &mut self,
         stages: &mut dyn StageSolver<M, T>,
         state: &mut StepState<T>,
@@ -64,7 +64,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             self.evaluate_midpoint_jacobian(stages, state)?;
         }
         if state.matrix_update < MatrixUpdate::Factors {
-            return Ok(!state.may_increase_order(B::ORDER_COUNT));
+            return Ok(true);
         }
         let mut factored = self.factor_matrix(stages, state);
         if state.verifies_pivots

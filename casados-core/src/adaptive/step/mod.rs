@@ -9,7 +9,7 @@ mod state;
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::newton_monitor::{NewtonFailure, THET};
 use crate::adaptive::options::AdaptiveOptions;
-use crate::adaptive::order::{MethodFamily, MethodsByOrder, interpolate_step};
+use crate::adaptive::order::{MethodFamily, MethodsByOrder, OrderSelection, interpolate_step};
 use crate::adaptive::point::ModelPoint;
 use crate::adaptive::stages::{StageSolver, StepContext};
 use crate::adaptive::statistics::AdaptiveStatistics;
@@ -161,7 +161,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.begin_sensitivities(x0, span.start)?;
         let stages = levels.get::<B>(0)?.stage_count();
         self.set_estimator_tolerances::<B>(stages);
-        let mut state = StepState::new(span, self.options.max_step);
+        let mut state = StepState::new(span, self.options.max_step, OrderSelection::lowest(B::ORDER_COUNT));
         let first = self.initial_step_size(span, state.max_step)?;
         if span.end == span.start {
             self.write_result();
@@ -171,7 +171,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         loop {
             self.choose_order::<B>(levels, &mut state)?;
             let stages = levels.get::<B>(state.order.order_index)?;
-            if !self.prepare_factors::<B>(stages, &mut state)? {
+            if !self.prepare_factors(stages, &mut state)? {
                 continue;
             }
             if state.attempts >= self.options.max_steps {

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::adaptive::newton_monitor::NewtonMonitor;
-use crate::adaptive::order::OrderSelection;
 use crate::adaptive::step_size::GustafssonController;
 
 /// The step size and the matrix are kept if the step would grow by at most this factor.
@@ -40,8 +39,6 @@ pub(super) struct StepState<T> {
     pub jacobian_is_current: bool,
     /// Whether a step from the current point was rejected.
     was_rejected: bool,
-    /// Whether the step size, and therefore the matrix, is that of the last step.
-    has_same_step_size: bool,
     pub order: OrderSelection,
     pub newton: NewtonMonitor,
     pub controller: GustafssonController,
@@ -58,7 +55,7 @@ pub(super) struct StepState<T> {
 }
 
 impl<T: Real> StepState<T> {
-    pub fn new(span: Span<T>, max_step: f64) -> Self {
+    pub fn new(span: Span<T>, max_step: f64, order: OrderSelection) -> Self {
         let length = span.end - span.start;
         Self {
             span,
@@ -73,8 +70,7 @@ impl<T: Real> StepState<T> {
             matrix_update: MatrixUpdate::Jacobian,
             jacobian_is_current: false,
             was_rejected: false,
-            has_same_step_size: false,
-            order: OrderSelection::default(),
+            order,
             newton: NewtonMonitor::default(),
             controller: GustafssonController::default(),
             last_refusal: Refusal::Error,
@@ -113,19 +109,6 @@ impl<T: Real> StepState<T> {
     /// The end of the step.
     pub fn end_time(&self) -> T {
         if self.is_last { self.span.end } else { self.t + self.h }
-    }
-
-    /// Counts a step with the matrix of the last one; returns whether a higher order justifies a
-    /// new matrix.
-    pub fn may_increase_order(&mut self, levels: usize) -> bool {
-        if !core::mem::take(&mut self.has_same_step_size) {
-            return false;
-        }
-        let grows = self.order.may_increase_order(levels);
-        if grows {
-            self.matrix_update = MatrixUpdate::Factors;
-        }
-        grows
     }
 
     /// Repeats the step with another size.
@@ -173,7 +156,7 @@ impl<T: Real> StepState<T> {
 
     /// Restarts from the current point with the present number of stages.
     pub fn restart(&mut self, t: T, first: f64) {
-        *self = Self { order: self.order, attempts: self.attempts, ..Self::new(self.span, self.max_step) };
+        *self = Self { attempts: self.attempts, ..Self::new(self.span, self.max_step, self.order) };
         self.t = t;
         self.set_first_step(first);
     }
@@ -202,8 +185,11 @@ impl<T: Real> StepState<T> {
         self.matrix_update = if fast { MatrixUpdate::Factors } else { MatrixUpdate::Jacobian };
         if self.overshoot(next_h) >= -slack {
             (self.h, self.is_last) = (self.span.end - end, true);
-        } else if fast && (1.0..=MAX_RATIO_WITH_SAME_MATRIX).contains(&(next / size)) {
-            (self.matrix_update, self.has_same_step_size) = (MatrixUpdate::Nothing, true);
+        } else if fast
+            && (1.0..=MAX_RATIO_WITH_SAME_MATRIX).contains(&(next / size))
+            && !self.order.may_increase(&self.newton)
+        {
+            self.matrix_update = MatrixUpdate::Nothing;
         } else {
             self.h = next_h;
         }
