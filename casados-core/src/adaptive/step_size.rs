@@ -88,10 +88,9 @@ pub struct ExplicitStep {
 }
 
 impl ExplicitStep {
-    /// Whether the step, shortened by a factor, is well above the roundoff errors of the time:
-    /// shorter steps do not help.
-    fn is_above_rounding<T: Real>(self, factor: f64) -> bool {
-        factor * self.h > 1e4 * T::EPSILON * self.t.abs()
+    /// Whether the step is well above the roundoff errors of the time: shorter steps do not help.
+    fn is_above_rounding<T: Real>(self) -> bool {
+        self.h > 1e4 * T::EPSILON * self.t.abs()
     }
 }
 
@@ -119,30 +118,23 @@ impl PiController {
             self.strong_rejection_end = self.strong_rejection_end.max(step.t + step.h);
         }
         let count = match step.branch_change {
-            _ if !step.is_above_rounding::<T>(1.0) => 1.0,
+            _ if !step.is_above_rounding::<T>() => 1.0,
             Some(BranchChange::Switch) => Self::BRANCH_ERROR_FACTOR,
-            None if !is_over_jump => 1.0,
-            _ => Self::DISCONTINUITY_ERROR_FACTOR,
+            _ if is_over_jump => Self::DISCONTINUITY_ERROR_FACTOR,
+            _ => 1.0,
         };
         count * difference
     }
 
-    /// The factor for the step size after a step with this error, within a range. If the model
-    /// changes its branch, the error is proportional to `h³` or a lower power.
-    pub fn step_size_factor<T: Real>(&mut self, step: ExplicitStep, error: f64) -> f64 {
+    /// The factor for the step size after a step with this error, within a range.
+    pub fn step_size_factor(&mut self, step: ExplicitStep, error: f64) -> f64 {
         let PiParameters {
             order, beta: memory, safety, uses_prediction: predicts, factor_range: range, ..
         } = self.parameters;
         let exponent = 1.0 / order;
         let present = fractional_power(error, exponent - 0.75 * memory);
         if error > 1.0 {
-            let over_branch = (0.9 / Scalar::cbrt(error)).clamp(0.1, 0.9);
-            let is_over_branch = step.branch_change == Some(BranchChange::Switch);
-            return if is_over_branch && step.is_above_rounding::<T>(over_branch) {
-                over_branch
-            } else {
-                (0.9 / present).clamp(range.0, range.1)
-            };
+            return (0.9 / present).clamp(range.0, range.1);
         }
         let (length, before) = core::mem::replace(&mut self.last_step_and_error, (step.h, error.max(1e-4)));
         let past = if memory > 0.0 { fractional_power(before, memory) } else { 1.0 };

@@ -5,7 +5,6 @@
 //! scale       = 1 / (estimator.1 + estimator.0 |x|)              tolerance_ratio = max user_ratio
 //! newton      = min(0.03, e^((s−1)/(s+1))) √min(1, 4/tolerance_ratio)        Radau IIA, e = min estimator.0
 //!               min(0.03, e^(s/(s+1)))                                       Gauss
-//! noise       = 100 ε / e
 //! ```
 
 use crate::model::{ArrayK, Dae};
@@ -37,8 +36,6 @@ pub struct Tolerances<M: Dae, T: Plain> {
     pub estimate_order: f64,
     /// The tolerance of Newton's method.
     pub newton_tolerance: f64,
-    /// Estimated errors below this are rounding errors.
-    pub noise: f64,
 }
 
 impl<M: Dae, T: Real> Tolerances<M, T> {
@@ -55,7 +52,6 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
             rtol,
             atol,
             newton_tolerance: newton,
-            noise,
             ..
         } = self;
         let mut finest: f64 = 1.0;
@@ -86,7 +82,7 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
             Scalar::powf(finest, s / (s + 1.0)).min(0.03)
         };
         let rounding = T::EPSILON / finest;
-        (*newton, *noise) = (wanted.max(10.0 * rounding), 100.0 * rounding);
+        *newton = wanted.max(10.0 * rounding);
     }
 
     /// Updates the scales of the estimator tolerances at the values `(x, z)`.

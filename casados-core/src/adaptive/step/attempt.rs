@@ -10,12 +10,6 @@ const SPLINE_KNOT_ERROR_FACTOR: f64 = 3.0;
 /// Factor of the error of a step across a switching surface, relative to the user's tolerance: a
 /// run may have many such steps, and later steps amplify their errors.
 const SWITCH_ERROR_FACTOR: f64 = 6.0;
-/// Minimum ratio of the least relevant error and the noise for the detection of discontinuities,
-/// which resemble rounding errors: relative tolerances of at least 3e-11 in `f64`.
-const MIN_ERROR_TO_NOISE: f64 = 1e4;
-/// A discontinuity rejects a step only if a step shorter by this factor is above the resolution of
-/// the time.
-const MIN_DISCONTINUITY_REDUCTION: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Selects the order if a new matrix is needed anyway, and sets the initial guess of the
@@ -212,22 +206,17 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         error: f64,
     ) -> Result<(), NewtonFailure> {
         let start = self.workspace.step_context(state);
-        let Tolerances { tolerance_ratio, noise, .. } = &self.workspace.tolerances;
-        let over_knot = *tolerance_ratio / SPLINE_KNOT_ERROR_FACTOR;
         let Some(change) = stages.branch_change(&start) else { return Ok(()) };
-        if MIN_ERROR_TO_NOISE * *noise * over_knot > 1.0 {
-            return Ok(());
-        }
         let factor = match change {
-            BranchChange::Switch => SWITCH_ERROR_FACTOR * *tolerance_ratio,
-            BranchChange::SplineKnot => over_knot,
-        };
+            BranchChange::Switch => SWITCH_ERROR_FACTOR,
+            BranchChange::SplineKnot => 1.0 / SPLINE_KNOT_ERROR_FACTOR,
+        } * self.workspace.tolerances.tolerance_ratio;
         let discontinuity_error =
             factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
         // If a derivative jumps, the error is proportional to the fourth or a lower power of the
         // step size. A step at the resolution of the time is accepted.
         let factor = (0.9 * Scalar::powf(discontinuity_error, -0.25)).clamp(0.1, 0.9);
-        let shorter = state.h * T::from_f64(MIN_DISCONTINUITY_REDUCTION * factor);
+        let shorter = state.h * T::from_f64(factor);
         if discontinuity_error >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
             return Err(NewtonFailure::Discontinuity(factor));
         }

@@ -210,7 +210,7 @@ fn integrate_steps<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
             branch_change: step.branch_change(),
         };
         let error = controller.error_of_difference::<T>(taken, error).max(of_derivatives);
-        let factor = controller.step_size_factor::<T>(taken, error);
+        let factor = controller.step_size_factor(taken, error);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
