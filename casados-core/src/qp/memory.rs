@@ -3,6 +3,9 @@
 use super::error::QpError;
 use alloc::vec::Vec;
 
+/// The size of a cache line in bytes, which is that of the widest register.
+pub const CACHE_LINE: usize = 64;
+
 /// Returns a list of this many default elements.
 pub fn zeros<T: Copy + Default>(length: usize) -> Result<Vec<T>, QpError> {
     let mut memory = Vec::new();

@@ -4,6 +4,8 @@ use super::error::{QpError, QpField};
 use super::layout::{
     StageDims, StageOffsetsIter, copy_common, end, exceeds_memory, part, part_mut, take_mut,
 };
+#[cfg(feature = "alloc")]
+use super::memory::CACHE_LINE;
 use super::stage::{ConstraintVector, Stage, StageMut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -42,6 +44,9 @@ pub struct Qp<T, D, M> {
     /// The length of the data of the stages. A mark for every state and control of the first stage
     /// follows.
     stages: usize,
+    /// The start of a cache line, from which whole registers are read.
+    #[cfg(feature = "alloc")]
+    begin: usize,
     number: PhantomData<T>,
 }
 
@@ -112,7 +117,13 @@ impl<T: Real> HeapQp<T> {
     /// # Errors
     /// [`QpError::OutOfMemory`]; [`QpError::Dimension`] if there is no stage.
     pub fn new(dims: &[StageDims]) -> Result<Self, QpError> {
-        Self::in_memory(super::memory::copy(dims)?, super::memory::zeros(Self::memory(dims))?)
+        let line = CACHE_LINE / size_of::<T>();
+        let memory: Vec<T> = super::memory::zeros(Self::memory(dims).saturating_add(line))?;
+        let begin = memory.as_ptr().align_offset(CACHE_LINE).min(line);
+        let mut qp = Self::in_memory(super::memory::copy(dims)?, memory)?;
+        qp.begin = begin;
+        qp.clear();
+        Ok(qp)
     }
 }
 
@@ -138,24 +149,42 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
             return Err(QpError::Dimension { field: QpField::Data, stage: 0, expected, found });
         }
         let stages = end::<T>(dims.as_ref()).data;
-        let mut qp = Self { dims, memory, stages, number: PhantomData };
+        let mut qp = Self {
+            dims,
+            memory,
+            stages,
+            #[cfg(feature = "alloc")]
+            begin: 0,
+            number: PhantomData,
+        };
         qp.clear();
         Ok(qp)
     }
     /// Resets the data to zero, without bounds.
     pub fn clear(&mut self) {
-        let Self { dims, memory, .. } = self;
-        clear(dims.as_ref(), memory.as_mut());
+        let (dims, data) = self.parts_mut();
+        clear(dims, data);
+    }
+    /// Returns dimensions and numbers.
+    fn parts_mut(&mut self) -> (&[StageDims], &mut [T]) {
+        let data = self.memory.as_mut();
+        #[cfg(feature = "alloc")]
+        let data = data.get_mut(self.begin..).unwrap_or_default();
+        (self.dims.as_ref(), data)
     }
     /// Returns a view for solvers.
     #[must_use]
     pub fn view(&self) -> QpView<'_, T> {
         let (dims, data) = (self.dims.as_ref(), self.memory.as_ref());
+        #[cfg(feature = "alloc")]
+        let data = data.get(self.begin..).unwrap_or_default();
         QpView { dims, data, marks: part(data, self.stages, coupling_mark_count(dims)) }
     }
     /// Returns the marks of periodic states and shared controls.
     pub(super) fn marks_mut(&mut self) -> &mut [T] {
-        part_mut(self.memory.as_mut(), self.stages, coupling_mark_count(self.dims.as_ref()))
+        let stages = self.stages;
+        let (dims, data) = self.parts_mut();
+        part_mut(data, stages, coupling_mark_count(dims))
     }
     /// Returns the dimensions of the stages.
     #[must_use]
@@ -164,17 +193,19 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     }
     /// Returns a mutable stage.
     pub fn stage_mut(&mut self, stage: usize) -> Option<StageMut<'_, T>> {
-        let place = StageOffsetsIter::<T>::new(self.dims.as_ref()).nth(stage)?;
-        Some(StageMut { place, data: part_mut(self.memory.as_mut(), place.data, place.data_len()) })
+        let (dims, data) = self.parts_mut();
+        let place = StageOffsetsIter::<T>::new(dims).nth(stage)?;
+        Some(StageMut { place, data: part_mut(data, place.data, place.data_len()) })
     }
     /// Returns all mutable stages in order.
     pub fn stages_mut(&mut self) -> impl Iterator<Item = StageMut<'_, T>> {
-        stages_mut(self.dims.as_ref(), self.memory.as_mut())
+        let (dims, data) = self.parts_mut();
+        stages_mut(dims, data)
     }
     /// Returns all data of the stages.
     #[cfg(feature = "alloc")]
     pub(super) fn data_mut(&mut self) -> &mut [T] {
-        self.memory.as_mut()
+        self.parts_mut().1
     }
     /// Fixes the initial state `x₀`, by two equal hard bounds of every component.
     ///

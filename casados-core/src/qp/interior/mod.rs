@@ -227,10 +227,13 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let counts = count(qp, &reading);
         let extent = Extent::of::<T>(qp.dims);
         let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
-        let mut numbers = self.numbers.at_least(length, QpField::Numbers)?;
+        let numbers = self.numbers.at_least(length, QpField::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
-        let mut sides = Inequalities::new(counts, &mut numbers, &mut indices);
+        // Arrays of inequalities have any length: they follow the arrays of whole registers.
+        let (mut numbers, mut of_inequalities) =
+            numbers.split_at_mut_checked(length - counts.memory_len()).unwrap_or_default();
+        let mut sides = Inequalities::new(counts, &mut of_inequalities, &mut indices);
         sides.list(qp, &reading);
         let given = attempt.penalties == PenaltyMode::Given;
         let rows = take_mut(&mut numbers, extent.end.row);

@@ -145,10 +145,11 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>, r
         }
         // A state without any cost has the size of its dynamics.
         let dynamics = part(qp.data, place.data, place.next * place.ld);
-        for (root_of_state, column) in next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1))) {
+        let states = next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1)));
+        for (root_of_state, column) in states.filter(|(root, _)| **root == T::ZERO) {
             let terms = column.iter().zip(&*variables);
             let reach = terms.fold(T::ZERO, |most, (a, &unit)| (a.abs() * unit).max(most));
-            if *root_of_state == T::ZERO && reach > T::ZERO {
+            if reach > T::ZERO {
                 *root_of_state = root / reach;
             }
         }
@@ -174,8 +175,10 @@ fn objective_unit<T: Real>(
             let room = limits.bound_range();
             rooms.add(root * room);
             gains.add(root * limits.distance());
-            let is_bounded = slope > root * root * room;
-            gains.add(if is_bounded { (slope * room).sqrt() } else { slope / root });
+            if slope != T::ZERO {
+                let is_bounded = slope > root * root * room;
+                gains.add(if is_bounded { (slope * room).sqrt() } else { slope / root });
+            }
         }
     }
     // At a stationary point the gain is small: then the unit is the cost of the narrowest range, at

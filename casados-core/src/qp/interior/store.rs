@@ -1,6 +1,8 @@
 //! Memory of a solver: fixed, or growing on the heap.
 
 use crate::qp::error::{QpError, QpField};
+#[cfg(feature = "alloc")]
+use crate::qp::memory::CACHE_LINE;
 
 /// Memory of a solver: an array or slice, or, with the feature `alloc`, a `Vec` that grows for
 /// larger problems and never shrinks.
@@ -66,7 +68,10 @@ impl<T> Store<T> for &mut [T] {
 #[cfg(feature = "alloc")]
 impl<T: Copy + Default> Store<T> for alloc::vec::Vec<T> {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError> {
-        crate::qp::memory::try_resize(self, length)?;
-        checked_slice(self, length, field)
+        // Whole registers are read from the start of a cache line.
+        let line = CACHE_LINE / size_of::<T>().max(1);
+        crate::qp::memory::try_resize(self, length.saturating_add(line))?;
+        let begin = self.as_ptr().align_offset(CACHE_LINE).min(line);
+        checked_slice(self.get_mut(begin..).unwrap_or_default(), length, field)
     }
 }

@@ -22,16 +22,20 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
 ) -> Result<Iterate<'a, T>, QpError> {
-    let mut numbers = numbers.at_least(lengths.number_count, QpField::Numbers)?;
-    let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
+    let numbers = numbers.at_least(lengths.number_count, QpField::Numbers)?;
+    // Arrays of inequalities have any length: they follow the arrays of whole registers.
+    let counts = lengths.counts;
+    let length = lengths.number_count.saturating_sub(counts.memory_len() + counts.equations);
+    let (mut numbers, mut of_inequalities) = numbers.split_at_mut_checked(length).unwrap_or_default();
+    let mut indices = indices.at_least(counts.indices(), QpField::Indices)?;
     let first =
         if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
-    let mut inequalities = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
+    let mut inequalities = Inequalities::new(counts, &mut of_inequalities, &mut indices);
     let ProblemScaling { objective_unit, min_row_unit } = lengths.scaling;
     inequalities.dual_regularisation =
         T::from_f64(Scalar::sqrt(T::EPSILON) * min_row_unit * min_row_unit / objective_unit);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
-    iterate.inequalities.equation_multiplier_steps = take_mut(&mut numbers, lengths.counts.equations);
+    iterate.inequalities.equation_multiplier_steps = take_mut(&mut of_inequalities, counts.equations);
     Ok(iterate)
 }
 
