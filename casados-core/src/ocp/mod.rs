@@ -1,11 +1,14 @@
 //! Problems of optimal control, discretised by direct multiple shooting or direct collocation.
 //!
 //! ```text
-//! min  Σ_k l(x_k, z_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)        z_k = ζ(x_k, u_k, p_k)
-//!      lb ≤ (x_k, u_k) ≤ ub        lg ≤ g(x_k, z_k, u_k, p_k, t_k) ≤ ug        each side optional, each side hard or soft
+//! min   Σ_k l(x_k, z_k, u_k, p_k, t_k) + e(x_N)
+//! s.t.  x_{k+1} = φ(x_k, u_k, p_k),  z_k = ζ(x_k, u_k, p_k)
+//!       lb ≤ (x_k, u_k) ≤ ub,  lg ≤ g(x_k, z_k, u_k, p_k, t_k) ≤ ug
 //! ```
 //!
-//! | | |
+//! Each bound is optional, and hard or soft.
+//!
+//! | term | types |
 //! | --- | --- |
 //! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, `Collocation`, [`Map`] |
 //! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`ConvexCost`] `φ(y − r)`, [`GeneralCost`], pairs of costs; integrals with [`WithIntegral`] |
@@ -17,9 +20,12 @@
 //! of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves it:
 //!
 //! ```text
-//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        Exact, the default: all of it, regularised where a QP is not convex; GaussNewton: JᵀWJ of least squares alone
+//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]
 //! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
 //! ```
+//!
+//! `Exact`, the default, is the whole Hessian, regularised where a QP is not convex; `GaussNewton`
+//! is `JᵀWJ` of least squares.
 //!
 //! It uses a line search (merit function, filter, second-order correction) or full steps, and
 //! elastic mode where a QP is infeasible. Its [`Outcome`] has the status, and the constraint that
