@@ -34,6 +34,7 @@ mod linear_controls_and_integrals;
 mod linear_equations;
 mod options;
 mod phases;
+mod polynomial_controls;
 mod published;
 mod random;
 mod real_time;

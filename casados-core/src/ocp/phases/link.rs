@@ -185,7 +185,8 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
             check_dimension(name, argument, [expected, found])?;
         }
         check_dimension(name, "output", [dims.next_states, F::Outputs::NY])?;
-        AvailableVariables { z: false, u: false, stage: dims.stage, t: dims.is_timed }.check::<F>()
+        AvailableVariables { z: false, u: false, stage: dims.stage, t: dims.is_timed, degrees: &[] }
+            .check::<F>()
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
         self.load_variables(end);

@@ -253,6 +253,14 @@ pub enum OcpError {
         /// The alternative.
         remedy: &'static str,
     },
+    /// A running cost, which is evaluated at nodes, depends on a control that is a polynomial in
+    /// every interval.
+    CostAtNodes {
+        /// The function.
+        function: &'static str,
+        /// The coefficient of the control.
+        coefficient: &'static str,
+    },
     /// The end time is free, and a function depends on the time of the integrator.
     DependsOnTime {
         /// The function.
