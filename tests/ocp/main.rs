@@ -40,6 +40,7 @@ mod random;
 mod real_time;
 mod scaling;
 mod second_attempt;
+mod solution_derivatives;
 mod trajectory;
 mod verification;
 mod warnings;

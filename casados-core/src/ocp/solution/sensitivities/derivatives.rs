@@ -18,15 +18,15 @@ use crate::shape::Shape;
 impl<T: Real> SolutionFactors<T> {
     /// Computes the Hessian of the optimal value.
     pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
-        let ([nx, _, np], given) = (self.dims, self.given_initial_states());
+        let ([_, _, np], given) = (self.dims, self.given_initial_states());
         let mut direction = core::mem::take(&mut self.direction);
         for i in 0..given {
             solve::solve_initial_state(self, i, &mut direction);
-            copy_common(part_mut(&mut self.hessian_x0, i * nx, nx), direction.multipliers(0));
+            copy_common(part_mut(&mut self.hessian_x0, i * given, given), direction.multipliers(0));
         }
         for p in 0..np {
             solve::solve_parameter(self, p, &mut direction);
-            copy_common(part_mut(&mut self.hessian_x0_p, p * nx, nx), direction.multipliers(0));
+            copy_common(part_mut(&mut self.hessian_x0_p, p * given, given), direction.multipliers(0));
             for q in 0..np {
                 let value = get(&self.parameter_derivatives.value_hessian, p * np + q)
                     + self.product_with_parameter(q, &direction);
@@ -35,7 +35,7 @@ impl<T: Real> SolutionFactors<T> {
         }
         self.direction = direction;
         ValueHessian {
-            xx: part(&self.hessian_x0, 0, given * nx),
+            xx: part(&self.hessian_x0, 0, given * given),
             xp: part(&self.hessian_x0_p, 0, given * np),
             pp: &self.hessian_p,
         }
@@ -91,7 +91,7 @@ impl<T: Real> SolutionFactors<T> {
             return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
         }
         for (stage, stage_point) in seed.stages().enumerate() {
-            let controls = if stage < self.intervals { nu } else { 0 };
+            let controls = if stage < self.intervals { nu } else { self.free };
             for (part, values, expected) in
                 [(Part::States, stage_point.x, nx), (Part::Controls, stage_point.u, controls)]
             {
@@ -128,6 +128,7 @@ impl<T: Real> SolutionFactors<T> {
         let mut direction = core::mem::take(&mut self.direction);
         let result = BorderedSystem::factorise(self, &mut direction);
         self.direction = direction;
+        self.write_feedback();
         recursion::value_gradient(qp, iterate, &mut self.gradient);
         result
     }
@@ -143,7 +144,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// The errors of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is undefined;
-    /// [`OcpError::FreeParameters`]; [`OcpError::Length`] if the memory is that of another problem;
+    /// [`OcpError::Length`] if the memory is that of another problem;
     /// [`OcpError::InvalidOption`] for the smoothing; [`OcpError::Qp`] if the reduced Hessian is
     /// not positive definite.
     pub fn factorise<C: Curvature<P::Dynamics, T>>(
@@ -154,8 +155,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.prepare_factors(factors)?;
         let problem = &mut factors.parameter_derivatives;
         problem.reset();
-        self.linearise_with_observer(curvature, &mut |k, step| problem.add_interval(k, step))?;
+        let free = self.free.clone();
+        self.linearise_with_observer(curvature, &mut |k, step| problem.add_interval(k, step, free.view()))?;
         self.differentiate_functions(C::EXACT, problem)?;
+        problem.clear_free_parameters(self.free.view());
         factors.factorise_qp(self.qp.view(), &self.iterate, true)
     }
 
@@ -163,17 +166,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`],
-    /// [`OcpError::FreeParameters`]
+    /// [`OcpError::Unsupported`]
     pub(super) fn prepare_factors(&self, factors: &mut SolutionFactors<T>) -> Result<(), OcpError> {
         if self.initial_state == InitialState::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
-        }
-        if self.free.count() > 0 {
-            return Err(OcpError::FreeParameters);
-        }
-        if self.initial_state == InitialState::PartlyFixed {
-            let what = "derivatives of solutions whose controls are linear";
-            return Err(OcpError::Unsupported { what, remedy: "Write these as states of the model" });
         }
         if self.layout().inner_rows > 0 {
             let what =
@@ -189,17 +185,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             });
         }
         let (part, stage) = (Part::Memory, 0);
-        let problem_dims = [P::Shape::NX, P::Shape::NU, P::Shape::NP, self.intervals()];
+        let free = self.free.count();
+        let problem_dims = [P::Shape::NX, free + P::Shape::NU, P::Shape::NP, self.intervals(), free];
         let [nx, nu, np] = factors.dims;
-        for (expected, found) in problem_dims.into_iter().zip([nx, nu, np, factors.intervals]) {
+        for (expected, found) in problem_dims.into_iter().zip([nx, nu, np, factors.intervals, factors.free]) {
             if expected != found {
                 return Err(OcpError::Length { part, stage, expected, found });
             }
         }
-        factors.bordered_system.prepare(
-            self.qp.view(),
-            self.initial_state == InitialState::Free,
-            [nx, nu, self.intervals()],
-        )
+        let free_states = match self.initial_state {
+            InitialState::Free => 0..nx,
+            InitialState::PartlyFixed => {
+                let names = self.names();
+                names.model_state_count()..names.model_state_count() + names.linear.len()
+            }
+            _ => 0..0,
+        };
+        factors.bordered_system.prepare(self.qp.view(), free_states, [nx, nu, self.intervals()])
     }
 }

@@ -28,7 +28,7 @@ impl<T: Real> KktDirection<T> {
             nx,
             nu,
             x: zeros((n + 1) * nx)?,
-            u: zeros(n * nu)?,
+            u: zeros((n + 1) * nu)?,
             pi: zeros((n + 1) * nx)?,
             initial_state: zeros(nx)?,
             work: zeros(2 * nx + nu)?,

@@ -168,8 +168,9 @@ fn backward_sweep<T: Real, R: RightHandSide<T>>(
             let controls = part(&factors.control_factors, k * nu * nu, nu * nu);
             solve_controls(controls, part(q, nx, nu), part_mut(u, k * nu, nu));
         } else {
-            right_hand_side.gradient(k, part_mut(q, 0, nx));
+            right_hand_side.gradient(k, q);
             factors.bordered_system.add_periodic_multipliers(unknowns, q);
+            factors.bordered_system.add_shared_control_gradient(k, unknowns, q, residual);
         }
         for (j, s) in part_mut(pi, k * nx, nx).iter_mut().enumerate() {
             let of_controls = if k < n { dot(factors.gain_column(k, j), part(q, nx, nu)) } else { T::ZERO };
@@ -193,16 +194,18 @@ fn forward_sweep<T: Real, R: RightHandSide<T>>(
         border_residual: residual,
         ..
     } = direction;
-    copy_common(part_mut(x, 0, nx), factors.bordered_system.initial_state(start, unknowns));
+    factors.bordered_system.write_initial_state(start, unknowns, part_mut(x, 0, nx));
     for k in 0..=factors.intervals {
         let (before, after) = x.split_at_mut_checked((k + 1) * nx).unwrap_or_default();
         let state = part(before, k * nx, nx);
         let multipliers = part_mut(pi, k * nx, nx);
         factors.cost_to_go(k).zip(state).for_each(|(column, &x)| axpy(x, column, multipliers));
+        let control = part_mut(u, k * nu, nu);
         if k == factors.intervals {
+            control.fill(T::ZERO);
+            factors.bordered_system.set_shared_controls(k, state, control, unknowns, residual);
             break;
         }
-        let control = part_mut(u, k * nu, nu);
         for (j, &x) in state.iter().enumerate() {
             axpy(x, factors.gain_column(k, j), control);
         }
