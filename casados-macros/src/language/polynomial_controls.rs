@@ -5,10 +5,11 @@
 //! u(t) = Σ_i c_i B_i(θ)        B_i = C(d, i) θⁱ (1 − θ)^(d − i)        θ = (t − t_k) / h
 //! ```
 //!
-//! The Bernstein coefficients `c_0 … c_d` replace the control; `c_0` and `c_d` are its values at the
-//! start and the end of an interval, and the polynomial lies between the smallest and the largest
-//! coefficient. Start `t_k` and length `h` of the interval are two parameters more, the last ones. A
-//! function with the arguments of the model has the same variables; there `du` is the rate of `u`.
+//! The Bernstein coefficients `c_0 … c_d` replace the control; `c_0` and `c_d` are its values at
+//! the start and the end of an interval, and the polynomial lies between the smallest and the
+//! largest coefficient. Start `t_k` and length `h` of the interval are two more parameters, the
+//! last ones. A function with the arguments of the model has the same variables; there `du` is the
+//! rate of `u`.
 
 use super::Model;
 use super::augmented_states::indices_of_name;
@@ -53,9 +54,10 @@ impl Parse for PolynomialControl {
         }
         let message = "a control and its degree: `degree(u = 1)`";
         input.parse::<Token![=]>().map_err(|_| Error::new(span, message))?;
-        let degree = match input.parse()? {
-            Lit::Int(literal) => literal.base10_parse()?,
-            other => return Err(Error::new(other.span(), message)),
+        let place = input.span();
+        let degree = match input.parse() {
+            Ok(Lit::Int(literal)) => literal.base10_parse()?,
+            _ => return Err(Error::new(place, message)),
         };
         if !(1..=MAX_DEGREE).contains(&degree) {
             let message =

@@ -14,12 +14,15 @@
 //! | `phase` | a phase, independent of the type of its problem |
 //! | `stage_conversion` | points, bounds and QPs of phases and of the joined problem |
 //! | `program` | the interface to solvers |
+//! | `derivatives` | derivatives of solutions and values |
 
+mod derivatives;
 mod link;
 mod phase;
 mod program;
 mod stage_conversion;
 
+pub use derivatives::{PhaseAdjoint, PhaseDirection, PhaseFactors};
 pub use link::{Continuous, Jump, Link};
 #[doc(hidden)]
 pub use link::{PhaseDims, PhaseEnd};

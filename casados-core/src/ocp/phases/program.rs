@@ -184,16 +184,34 @@ macro_rules! programs {
 
 programs!(f64, f32);
 
-/// Writes the QP at the iterate, and returns the objective.
+/// Writes the QP at the iterate.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
     kind: Kind,
+) -> Result<(), OcpError> {
+    write_linearised(ocp, kind, |_, phase| phase.linearise(kind))
+}
+
+/// Writes the QP with exact Hessians at the iterate, from phases that `linearise` linearises.
+pub(super) fn write_with<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
+    linearise: impl FnMut(usize, &mut dyn Phase<T>) -> Result<T, OcpError>,
+) -> Result<(), OcpError> {
+    write_linearised(ocp, Kind { exact: true, convexification: Convexification::None }, linearise)
+}
+
+/// Writes the QP at the iterate. `linearise` writes that of a phase, and returns its objective.
+fn write_linearised<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
+    kind: Kind,
+    mut linearise: impl FnMut(usize, &mut dyn Phase<T>) -> Result<T, OcpError>,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
     ocp.problem.set_step_length(ocp.step_length);
     let mut objective = T::ZERO;
     for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
-        objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
+        let of_phase = linearise(index, phase.problem).map_err(|error| error.in_phase(index))?;
+        objective = objective + of_phase;
     }
     ocp.objective = objective;
     ocp.stage_residuals = ocp.problem.stage_residuals();

@@ -237,6 +237,9 @@ impl fmt::Display for OcpError {
                  `#[ode(duration = p.duration)]`"
             ),
             Self::Unsupported { what, remedy } => write!(f, "not supported: {what}. {remedy}"),
+            Self::NoSuchPhase { phase, phases } => {
+                write!(f, "there is no phase {phase}: there are {phases}, counted from 0")
+            }
             Self::CostAtNodes { function, coefficient } => write!(
                 f,
                 "the running cost `{function}` depends on `{coefficient}`, a coefficient of a polynomial \

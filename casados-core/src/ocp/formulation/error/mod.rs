@@ -39,6 +39,13 @@ pub enum OcpError {
         /// The names of the model.
         known: &'static Names,
     },
+    /// A phase that joined phases do not have.
+    NoSuchPhase {
+        /// The phase.
+        phase: usize,
+        /// The number of phases.
+        phases: usize,
+    },
     /// A stage that the horizon does not have.
     NoSuchStage {
         /// The part to be set.

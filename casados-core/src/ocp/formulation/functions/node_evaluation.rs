@@ -296,8 +296,8 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             }
         }
     }
-    /// Adds the blocks `xp`, `up` and `pp`, column after column. Rows of `pp` of free parameters are
-    /// rows of variables, too.
+    /// Adds the blocks `xp`, `up` and `pp`, column after column. Rows of `pp` of free parameters
+    /// are rows of variables, too.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up, pp]: [&[T]; 3]) {
         for (to, &value) in self.hessian.iter_mut().zip(pp) {

@@ -4,6 +4,8 @@ use super::bordered_system::BorderedSystem;
 use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
 use super::kkt_direction::KktDirection;
+use super::parameters::KktParameterDerivatives;
+use super::recursion::ActiveConstraintSink;
 use super::results::{SolutionAdjoint, ValueHessian};
 use super::{recursion, solve};
 use crate::ocp::formulation::error::{OcpError, Part};
@@ -78,7 +80,8 @@ impl<T: Real> SolutionFactors<T> {
             let pairs = pairs.chain(end.iter().zip(direction.multipliers(k + 1)));
             sum = pairs.fold(sum, |sum, (&a, &b)| sum + a * b);
         }
-        sum
+        let slope = |stage, row| self.parameter_derivatives.constraint_slope(stage, row, p);
+        sum + self.product_with_forces(direction, slope)
     }
 
     fn check_seed<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
@@ -106,15 +109,28 @@ impl<T: Real> SolutionFactors<T> {
         Ok(())
     }
 
-    /// Factorises the QP at the iterate by the recursion and the bordered system.
+    /// # Errors
+    /// [`OcpError::InvalidOption`]
+    pub(in crate::ocp) fn check_smoothing(&self) -> Result<(), OcpError> {
+        let value = self.smoothing.to_f64();
+        if value >= 0.0 && value.is_finite() {
+            return Ok(());
+        }
+        Err(OcpError::InvalidOption { name: "smoothing", value, allowed: "at least 0 and finite" })
+    }
+
+    /// Factorises the QP at the iterate by the recursion and the bordered system, with active
+    /// constraints of this compliance. A small one leaves an error to be removed by forces, a
+    /// smaller one loses digits: `∛ε` for solves, `√ε` for gains, which have no forces.
     ///
     /// # Errors
     /// [`OcpError::Qp`]
-    pub(super) fn factorise_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    pub(in crate::ocp) fn factorise_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: QpView<'_, T>,
         iterate: &Solution<T, D, M>,
-        with_parameters: bool,
+        compliance: T,
+        on_active: ActiveConstraintSink<'_, T>,
     ) -> Result<(), OcpError> {
         let mut largest = T::ZERO;
         for stage in qp.stages() {
@@ -122,8 +138,8 @@ impl<T: Real> SolutionFactors<T> {
                 largest = value.abs().max(largest);
             }
         }
-        let mut stiffness = BoundStiffness::new(largest, self.smoothing);
-        recursion::factorise(self, qp, iterate, &mut stiffness, with_parameters)?;
+        let mut stiffness = BoundStiffness::new(largest, self.smoothing, compliance);
+        recursion::factorise(self, qp, iterate, &mut stiffness, on_active)?;
         self.weakly_active = stiffness.weakly_active;
         let mut direction = core::mem::take(&mut self.direction);
         let result = BorderedSystem::factorise(self, &mut direction);
@@ -153,13 +169,38 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         factors: &mut SolutionFactors<T>,
     ) -> Result<(), OcpError> {
         self.prepare_factors(factors)?;
-        let problem = &mut factors.parameter_derivatives;
-        problem.reset();
+        self.differentiate_with(curvature, &mut factors.parameter_derivatives)?;
+        let mut derivatives = core::mem::take(&mut factors.parameter_derivatives);
+        let compliance = T::from_f64(T::EPSILON).cbrt();
+        let result =
+            factors.factorise_qp(self.qp.view(), &self.iterate, compliance, &mut |place, stiffness, c| {
+                derivatives.add_constraint(place, stiffness, c);
+            });
+        factors.parameter_derivatives = derivatives;
+        result
+    }
+
+    /// Linearises the problem, and computes the derivatives of its functions with respect to
+    /// parameters.
+    ///
+    /// # Errors
+    /// The errors of [`Ocp::linearise`]; [`OcpError::Unsupported`]
+    pub(in crate::ocp) fn differentiate_with<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        result: &mut KktParameterDerivatives<T>,
+    ) -> Result<(), OcpError> {
+        if self.layout().inner_rows > 0 {
+            let what =
+                "derivatives of solutions with bounds of algebraic states or at points inside intervals";
+            return Err(OcpError::Unsupported { what, remedy: "Write these as path constraints at nodes" });
+        }
+        result.reset();
         let free = self.free.clone();
-        self.linearise_with_observer(curvature, &mut |k, step| problem.add_interval(k, step, free.view()))?;
-        self.differentiate_functions(C::EXACT, problem)?;
-        problem.clear_free_parameters(self.free.view());
-        factors.factorise_qp(self.qp.view(), &self.iterate, true)
+        self.linearise_with_observer(curvature, &mut |k, step| result.add_interval(k, step, free.view()))?;
+        self.differentiate_functions(C::EXACT, result)?;
+        result.clear_free_parameters(self.free.view());
+        Ok(())
     }
 
     /// Checks memory and options, and prepares the bordered system.
@@ -171,19 +212,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.initial_state == InitialState::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
-        if self.layout().inner_rows > 0 {
-            let what =
-                "derivatives of solutions with bounds of algebraic states or at points inside intervals";
-            return Err(OcpError::Unsupported { what, remedy: "Write these as path constraints at nodes" });
-        }
-        let value = factors.smoothing.to_f64();
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(OcpError::InvalidOption {
-                name: "smoothing",
-                value,
-                allowed: "at least 0 and finite",
-            });
-        }
+        factors.check_smoothing()?;
         let (part, stage) = (Part::Memory, 0);
         let free = self.free.count();
         let problem_dims = [P::Shape::NX, free + P::Shape::NU, P::Shape::NP, self.intervals(), free];

@@ -1,5 +1,6 @@
 //! Factors of the optimality conditions at a solution, for any number of derivatives.
 
+use super::active_constraints::ActiveConstraints;
 use super::bordered_system::BorderedSystem;
 use super::kkt_direction::KktDirection;
 use super::parameters::KktParameterDerivatives;
@@ -95,7 +96,7 @@ pub struct SolutionFactors<T> {
     pub(super) negative_pivots: usize,
     pub(super) bordered_system: BorderedSystem<T>,
     pub(super) parameter_derivatives: KktParameterDerivatives<T>,
-    pub(super) direction: KktDirection<T>,
+    pub(in crate::ocp) direction: KktDirection<T>,
     /// `∂V/∂x₀`, and the Hessian of the value.
     pub(super) gradient: Vec<T>,
     pub(super) hessian_x0: Vec<T>,
@@ -103,6 +104,7 @@ pub struct SolutionFactors<T> {
     pub(super) hessian_p: Vec<T>,
     pub(super) adjoint: Vec<T>,
     pub(super) weakly_active: usize,
+    pub(super) active: ActiveConstraints<T>,
     pub(super) work: Vec<T>,
 }
 
@@ -149,11 +151,13 @@ impl<T: Real> SolutionFactors<T> {
             hessian_p: zeros(np * np)?,
             adjoint: zeros(np)?,
             weakly_active: 0,
+            active: ActiveConstraints::default(),
             work: zeros(work_len(nx, nu))?,
         })
     }
 
     /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, by columns; empty for other stages.
+    /// Gains of controls at active bounds are zero up to `∛ε`.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.dims;
@@ -189,6 +193,21 @@ impl<T: Real> SolutionFactors<T> {
         &self.parameter_derivatives.value_gradient
     }
 
+    /// The product of the forces of active constraints with their derivatives by a parameter.
+    pub(in crate::ocp) fn product_with_forces(
+        &self,
+        direction: &KktDirection<T>,
+        slope: impl Fn(usize, usize) -> T,
+    ) -> T {
+        self.active.product(&direction.constraint_multipliers, slope)
+    }
+    /// States, controls and parameters of a stage.
+    pub(in crate::ocp) fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+    pub(in crate::ocp) fn intervals(&self) -> usize {
+        self.intervals
+    }
     /// The number of given elements of the first state: all, none, or all but linear controls and
     /// what follows them.
     pub(super) fn given_initial_states(&self) -> usize {

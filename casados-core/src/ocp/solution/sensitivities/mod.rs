@@ -5,19 +5,21 @@
 //! | `factors`, `derivatives` | factors of the KKT system: adjoints, derivatives of the value |
 //! | `recursion`, `bound_stiffness` | the Riccati recursion, and the stiffness of bounds |
 //! | `solve`, `kkt_direction`, `bordered_system` | solves by the factors, coupling of stages |
+//! | `active_constraints` | active constraints, and the removal of their compliance |
 //! | `parameters`, `references` | derivatives of the optimality conditions with respect to these |
 //! | `covariance` | the covariance of an estimate, and unidentifiable directions |
 //! | `unknowns`, `gram` | the unknowns of an estimate, and its reduced Hessian |
 
+pub(in crate::ocp) mod active_constraints;
 mod bordered_system;
 mod bound_stiffness;
 mod covariance;
 mod derivatives;
 mod factors;
 mod gram;
-mod kkt_direction;
-mod parameters;
-mod recursion;
+pub(in crate::ocp) mod kkt_direction;
+pub(in crate::ocp) mod parameters;
+pub(in crate::ocp) mod recursion;
 pub(in crate::ocp) mod references;
 mod results;
 mod solve;
@@ -137,7 +139,8 @@ impl<T: Real> Sensitivities<T> {
         stage_matrix(&self.u_p, stage, (nu - self.factors.free) * np)
     }
     /// `dw/dx₀` of the [free parameters](crate::ocp::HeapOcp::free), in the order of the calls of
-    /// `free`, after the elements of the first state that boundary conditions depend on; by columns.
+    /// `free`, after the elements of the first state that boundary conditions depend on; by
+    /// columns.
     #[must_use]
     pub fn dw(&self) -> &[T] {
         &self.w
@@ -257,7 +260,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         self.prepare_factors(&mut result.factors)?;
-        result.factors.factorise_qp(self.qp.view(), &self.iterate, false)?;
+        let compliance = T::from_f64(T::EPSILON).sqrt();
+        result.factors.factorise_qp(self.qp.view(), &self.iterate, compliance, &mut |_, _, _| {})?;
         let Sensitivities { x, u, x_p, u_p, .. } = result;
         for derivatives in [x, u, x_p, u_p] {
             derivatives.fill(T::ZERO);

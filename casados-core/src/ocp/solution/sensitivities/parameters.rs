@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
 /// Derivatives with respect to `p`, by stages.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::ocp) struct KktParameterDerivatives<T> {
     /// `NX`, free parameters and `NU`, `NP`
     dims: [usize; 3],
@@ -36,8 +36,8 @@ pub(in crate::ocp) struct KktParameterDerivatives<T> {
     /// `∂g/∂p`, by rows.
     constraint_jacobians: Vec<T>,
     /// `∂L/∂p`, the gradient of the optimal value, and `∂²L/∂p²`: sums over all stages.
-    pub(super) value_gradient: Vec<T>,
-    pub(super) value_hessian: Vec<T>,
+    pub(in crate::ocp) value_gradient: Vec<T>,
+    pub(in crate::ocp) value_hessian: Vec<T>,
     /// `∂z/∂p`, by columns.
     algebraic_jacobians: Vec<T>,
     /// `∂²L/∂(x, u, z)∂p` of a stage for constant `z`.
@@ -72,17 +72,32 @@ impl<T: Real> KktParameterDerivatives<T> {
     }
 
     /// `∂φ/∂p` of an interval.
-    pub(super) fn end_jacobian(&self, k: usize) -> &[T] {
+    pub(in crate::ocp) fn end_jacobian(&self, k: usize) -> &[T] {
         let [nx, _, np] = self.dims;
         part(&self.end_jacobians, k * nx * np, nx * np)
     }
     /// `∂²L/∂(x, u)∂p` of a stage.
-    pub(super) fn gradient_jacobian(&self, k: usize) -> &[T] {
+    pub(in crate::ocp) fn gradient_jacobian(&self, k: usize) -> &[T] {
         let [nx, nu, np] = self.dims;
         part(&self.gradient_jacobians, k * (nx + nu) * np, (nx + nu) * np)
     }
+    /// The derivatives of the functions of a stage, for terms to be added.
+    pub(in crate::ocp) fn stage_derivatives<'a>(
+        &'a mut self,
+        k: usize,
+        free: FreeParametersView<'a>,
+    ) -> ParameterDerivatives<'a, T> {
+        let [nx, nu, np] = self.dims;
+        ParameterDerivatives {
+            free,
+            mixed_columns: part_mut(&mut self.gradient_jacobians, k * (nx + nu) * np, (nx + nu) * np),
+            ld: nx + nu,
+            gradient: &mut self.value_gradient,
+            hessian: &mut self.value_hessian,
+        }
+    }
     /// Adds the stiffness of a constraint with the gradient `c` over `(x, u)`.
-    pub(super) fn add_constraint(&mut self, [k, row]: [usize; 2], stiffness: T, c: &[T]) {
+    pub(in crate::ocp) fn add_constraint(&mut self, [k, row]: [usize; 2], stiffness: T, c: &[T]) {
         let [nx, nu, np] = self.dims;
         if row >= self.row_count(k) {
             return;
@@ -92,6 +107,16 @@ impl<T: Real> KktParameterDerivatives<T> {
         for (p, &slope) in slopes.iter().enumerate() {
             axpy(stiffness * slope, c, part_mut(&mut self.gradient_jacobians, (k * np + p) * size, c.len()));
             axpy(stiffness * slope, slopes, part_mut(&mut self.value_hessian, p * np, np));
+        }
+    }
+
+    /// The derivative of a constraint row by a parameter.
+    pub(in crate::ocp) fn constraint_slope(&self, stage: usize, row: usize, p: usize) -> T {
+        let [_, _, np] = self.dims;
+        if row < self.row_count(stage) {
+            get(&self.constraint_jacobians, (stage * self.rows + row) * np + p)
+        } else {
+            T::ZERO
         }
     }
 

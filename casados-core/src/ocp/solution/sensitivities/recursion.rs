@@ -1,5 +1,6 @@
 //! The Riccati recursion for derivatives of solutions.
 
+use super::active_constraints::ActiveConstraints;
 use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
 use super::kkt_direction::solve_controls;
@@ -45,8 +46,10 @@ fn lagrangian_derivative<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_
         .fold(cost_derivative, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
 }
 
-/// Computes `P_k`, `K_k` and the factors of `M_uu` backward. If `with_parameters`, adds active
-/// constraints to the derivatives with respect to parameters.
+/// Receives stage and row of an active constraint, its stiffness and its gradient.
+pub(in crate::ocp) type ActiveConstraintSink<'a, T> = &'a mut dyn FnMut([usize; 2], T, &[T]);
+
+/// Computes `P_k`, `K_k` and the factors of `M_uu` backward.
 ///
 /// # Errors
 /// [`QpError::NotConvex`]
@@ -55,17 +58,19 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
     stiffness: &mut BoundStiffness<T>,
-    with_parameters: bool,
+    on_active: ActiveConstraintSink<'_, T>,
 ) -> Result<(), OcpError> {
     let [nx, nu, _] = factors.dims;
     let (size, n) = (nx + nu, factors.intervals);
     let mut memory = core::mem::take(&mut factors.work);
     factors.negative_pivots = 0;
+    let mut active = core::mem::take(&mut factors.active);
+    active.clear();
     let (product, rest) = memory.split_at_mut_checked(nx * size).unwrap_or_default();
     let m = part_mut(rest, 0, size * size);
     let mut result = Ok(());
     for (k, (stage, point)) in qp.stages().zip(iterate.stages()).enumerate().rev() {
-        write_stage_hessian(factors, m, [k, size], (&stage, &point), stiffness, with_parameters);
+        write_stage_hessian(factors, m, [k, size], (&stage, &point), (stiffness, &mut active), on_active);
         if k < n {
             let view = stage.arrays();
             let rows = part_mut(&mut factors.dynamics, k * nx * size, nx * size);
@@ -107,18 +112,18 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
     }
-    factors.work = memory;
+    (factors.work, factors.active) = (memory, active);
     result
 }
 
 /// Writes `M = H` plus the stiffness of bounds: the lower triangle, by columns.
 fn write_stage_hessian<T: Real>(
-    factors: &mut SolutionFactors<T>,
+    factors: &SolutionFactors<T>,
     m: &mut [T],
     [k, size]: [usize; 2],
     (stage, point): (&Stage<'_, T>, &SolutionStage<'_, T>),
-    stiffness: &mut BoundStiffness<T>,
-    with_parameters: bool,
+    (stiffness, active): (&mut BoundStiffness<T>, &mut ActiveConstraints<T>),
+    on_active: ActiveConstraintSink<'_, T>,
 ) {
     let view = stage.arrays();
     let (variables, ld, [nx, nu, _]) = (view.n, view.ld, factors.dims);
@@ -138,12 +143,22 @@ fn write_stage_hessian<T: Real>(
     let is_unknown = |i: usize| k > 0 || factors.bordered_system.is_unknown(i);
     for (i, &x) in point.x.iter().enumerate().filter(|(i, _)| is_unknown(*i)) {
         let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
-        add(m, i * size + i, stiffness.stiffness_of_bound(&stage.x_bounds(), i, x, multipliers));
+        let bounds = stage.x_bounds();
+        let spring = stiffness.stiffness_of_bound(&bounds, i, x, multipliers);
+        add(m, i * size + i, spring);
+        if stiffness.is_active(&bounds, i, spring) {
+            active.add_variable(k, i, spring);
+        }
     }
     for (i, &u) in point.u.iter().enumerate() {
         let multipliers = [get(point.u_lower, i), get(point.u_upper, i)];
         let place = (nx + i) * (size + 1);
-        add(m, place, stiffness.stiffness_of_bound(&stage.u_bounds(), i, u, multipliers));
+        let bounds = stage.u_bounds();
+        let spring = stiffness.stiffness_of_bound(&bounds, i, u, multipliers);
+        add(m, place, spring);
+        if stiffness.is_active(&bounds, i, spring) {
+            active.add_variable(k, nx + i, spring);
+        }
     }
     for (row, (&lower, &upper)) in point.g_lower.iter().zip(point.g_upper).enumerate() {
         let c = part(view.matrix, (view.next + row) * ld, variables);
@@ -158,14 +173,16 @@ fn write_stage_hessian<T: Real>(
                 add(m, at(i, j), row_stiffness * get(c, i) * factor);
             }
         }
-        if with_parameters {
-            factors.parameter_derivatives.add_constraint([k, row], row_stiffness, c);
+        on_active([k, row], row_stiffness, c);
+        if stiffness.is_active(&stage.g_bounds(), row, row_stiffness) {
+            let elements = c.iter().enumerate().map(|(i, &value)| (place(i), value));
+            active.add_row([k, row], row_stiffness, size, elements);
         }
     }
 }
 
 /// The index of a variable of a stage with `states` states among `(x, u)` with `nx` states.
-pub(super) const fn padded_index(variable: usize, states: usize, nx: usize) -> usize {
+pub(in crate::ocp) const fn padded_index(variable: usize, states: usize, nx: usize) -> usize {
     if variable < states { variable } else { nx + variable - states }
 }
 
