@@ -9,8 +9,8 @@ use casados::prelude::*;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// A sledge that is pushed for a free time: place and speed, a mass that is found, a friction, and a
-/// price of the push.
+/// A sledge that is pushed for a free time: place and speed, a mass that is found, a friction, and
+/// a price of the push.
 #[ode(duration = p.duration)]
 mod sledge {
     pub struct Data {

@@ -84,9 +84,9 @@ pub(super) trait Phase<T: Real> {
     fn free_parameters(&self) -> &FreeParameters;
     /// Returns the index of a parameter of the model among the free parameters.
     fn free_index(&self, parameter: usize) -> Option<usize>;
-    /// Returns the dimensions that a link at its end must match; `begins` is the number of states
-    /// of the next phase.
-    fn link_dims(&self, begins: usize) -> PhaseDims;
+    /// Returns the dimensions that a link at its end must match; `next_states` is the number of
+    /// states of the next phase.
+    fn link_dims(&self, next_states: usize) -> PhaseDims;
     /// Returns a feature that phases do not support. Frees the start of every phase but the first.
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
@@ -160,11 +160,11 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn free_index(&self, parameter: usize) -> Option<usize> {
         self.free.view().index_of(parameter)
     }
-    fn link_dims(&self, begins: usize) -> PhaseDims {
+    fn link_dims(&self, next_states: usize) -> PhaseDims {
         PhaseDims {
             ending_dims: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
             model_states: self.names().model_state_count(),
-            next_states: begins,
+            next_states,
             stage: self.intervals(),
             is_timed: self.free.view().end_time_index().is_none(),
         }

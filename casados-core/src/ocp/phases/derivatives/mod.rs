@@ -21,12 +21,13 @@ use alloc::vec::Vec;
 use phase_part::{InitialStateRightHandSide, ParameterRightHandSide, PhasePart, SeedRightHandSide};
 
 /// Factors of the optimality conditions of joined phases at their solution: derivatives of states,
-/// controls and free parameters of all phases, adjoints, and the gradient of the optimal value, with
-/// respect to the initial state and to the parameters of every phase.
+/// controls and free parameters of all phases, adjoints, and the gradient of the optimal value,
+/// with respect to the initial state and to the parameters of every phase.
 ///
-/// They are those of [`SolutionFactors`], with exact Hessians: for a constant active set, parameters
-/// of all stages of a phase changing together. A parameter that is free has no derivatives. Equal
-/// parameters of two phases are two parameters; the derivative by both is the sum.
+/// They are those of [`SolutionFactors`], with exact Hessians: for a constant active set,
+/// parameters of all stages of a phase changing together. A parameter that is free has no
+/// derivatives. Equal parameters of two phases are two parameters; the derivative by both is the
+/// sum.
 ///
 /// `Ocp::factorise_phases` computes them, by one linearisation and one Riccati recursion.
 ///
@@ -192,9 +193,9 @@ impl<T: Real> PhaseFactors<T> {
         Ok(PhaseDirection { factors: self })
     }
 
-    /// Computes `λᵀ dw/dx₀` and `λᵀ dw/dp` for all initial states and parameters, by one solve. `λ`
-    /// is a list of elements of the solution, each with its phase, stage, name and weight. The names
-    /// are those of states, controls and free parameters of the phase, which have one value.
+    /// Computes `λᵀ dw/dx₀` and `λᵀ dw/dp` for all initial states and parameters, by one solve.
+    /// `λ` is a list of elements of the solution, each with its phase, stage, name and weight. The
+    /// names are those of states, controls and free parameters of the phase, which have one value.
     ///
     /// # Errors
     /// [`OcpError::NoSuchPhase`], [`OcpError::NoSuchStage`], [`OcpError::UnknownName`];
