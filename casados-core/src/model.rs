@@ -73,6 +73,10 @@ pub trait Dae: 'static {
     /// The controls that are rates of piecewise linear controls: `#[ode(linear = u)]`. The linear
     /// controls themselves are states after those of the model, in this order.
     const LINEAR: &'static [u32] = &[];
+    /// The degree of each control as written, if some are polynomials in every interval:
+    /// `#[ode(degree(u = 1))]`. Their Bernstein coefficients are controls of the model, and start
+    /// and length of the interval its last two parameters. Empty for constant and linear controls.
+    const DEGREES: &'static [u32] = &[];
     /// Number of integrals, which are the last states: `#[ode(integrals(energy = u * u))]`.
     const INTEGRALS: usize = 0;
     /// Number of conditions (of `if`, `max`, `abs`, ..) and tables in the residual, if known.

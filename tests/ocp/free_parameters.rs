@@ -339,7 +339,7 @@ fn invalid_arguments() -> Test {
     ocp.free("p", 0.0..=1.0, 0.5)?;
     assert!(matches!(old.solve(&mut ocp), Err(OcpError::Length { .. })));
     let mut sensitivities = Sensitivities::new(&ocp)?;
-    let error = ocp.differentiate(Exact::default(), &mut sensitivities).err();
+    let error = ocp.gains(&mut sensitivities).err();
     assert!(matches!(error, Some(OcpError::FreeParameters)), "{error:?}");
     // Free once more: another range and another guess.
     ocp.free("p", 0.0..=3.0, 2.0)?;

@@ -148,7 +148,7 @@ pub use nlp::ocp_solver::OcpSolver;
 pub use nlp::sqp::HeapSqp;
 pub use nlp::sqp::{Globalisation, Sqp, SqpOptions};
 #[cfg(feature = "alloc")]
-pub use phases::{Continuous, Jump, Link, PhaseDynamics, Phases};
+pub use phases::{Continuous, Jump, Link, PhaseAdjoint, PhaseDirection, PhaseDynamics, PhaseFactors, Phases};
 #[cfg(feature = "alloc")]
 #[doc(hidden)]
 pub use phases::{PhaseDims, PhaseEnd};

@@ -36,7 +36,8 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let (ty, structure) = (model_type(model), structure::function_structure(analysis));
     let (units, unit) = (units::write(krate, &model.units), units::output_unit(&model.units));
-    let is_timed = !analysis.time.is_empty() && model.duration.is_none();
+    let depends_on_time = model.extra.degrees.is_empty() || model.extra.is_timed;
+    let is_timed = !analysis.time.is_empty() && model.duration.is_none() && depends_on_time;
     let timed = is_timed.then(|| {
         quote!(
             const IS_TIMED: bool = true;

@@ -56,6 +56,10 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
         let controls = structure::index_literals(linear);
         quote!(const LINEAR: &'static [u32] = &[#(#controls),*];)
     });
+    let degrees = (!model.extra.degrees.is_empty()).then(|| {
+        let degrees = structure::index_literals(&model.extra.degrees);
+        quote!(const DEGREES: &'static [u32] = &[#(#degrees),*];)
+    });
     let integrals = (integrals > 0).then(|| {
         let count = Literal::usize_unsuffixed(integrals);
         quote!(const INTEGRALS: usize = #count;)
@@ -72,6 +76,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             const STRUCTURE: #krate::__private::Structure = #structure;
             #duration
             #linear
+            #degrees
             #integrals
             #domain
             #units

@@ -7,6 +7,7 @@
 //! - `crate = path`: the path of casados;
 //! - `duration = p.duration`: the parameter that scales time;
 //! - `linear = u.thrust`, `linear = [u[0], u[2]]`: piecewise linear controls;
+//! - `degree(u.thrust = 2)`: polynomials in every interval, with jumps;
 //! - `integrals(energy = u * u)`: integrals by name;
 //! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: nominal values and ranges;
 //! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: index reduction.
@@ -14,6 +15,7 @@
 use super::augmented_states::{self, AugmentedStates, Integral};
 use super::duration::Duration;
 use super::mistakes::CollectedErrors;
+use super::polynomial_controls::PolynomialControl;
 use super::reduction::Reduction;
 use super::sampling::{self, Kind, Sampling, Setting};
 use super::{Instance, Variables};
@@ -24,7 +26,7 @@ use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
 /// The possible arguments of an attribute.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
-    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `linear = u`, `integrals(name = ..)`, `nominal(x = ..)`, \
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `linear = u`, `degree(u = 1)`, `integrals(name = ..)`, `nominal(x = ..)`, \
     `range(x = ..)` and \
     `index_reduction`";
 
@@ -94,6 +96,7 @@ impl Arguments {
                     }
                 }
                 Entry::Linear(names) => arguments.extension.linear.extend(names),
+                Entry::Degrees(controls) => arguments.extension.polynomials.list.extend(controls),
                 Entry::Integrals(integrals) => {
                     for integral in integrals {
                         let name = &integral.name;
@@ -246,6 +249,7 @@ enum Entry {
     Reduction(Reduction),
     Duration(Duration),
     Linear(Vec<(String, Span)>),
+    Degrees(Vec<PolynomialControl>),
     Integrals(Vec<Integral>),
 }
 
@@ -280,6 +284,15 @@ impl Parse for Entry {
             syn::parenthesized!(content in input);
             let list = content.parse_terminated(Integral::parse, Token![,])?;
             return Ok(Self::Integrals(list.into_iter().collect()));
+        }
+        if let [name] = &names[..]
+            && name == "degree"
+            && input.peek(syn::token::Paren)
+        {
+            let content;
+            syn::parenthesized!(content in input);
+            let list = content.parse_terminated(PolynomialControl::parse, Token![,])?;
+            return Ok(Self::Degrees(list.into_iter().collect()));
         }
         if let [name] = &names[..]
             && name == "index_reduction"

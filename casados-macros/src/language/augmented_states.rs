@@ -9,6 +9,7 @@
 //! and it may have the rates as an argument `du`, and the integrals as an argument `q`.
 
 use super::model::count_in_words;
+use super::polynomial_controls::{self, PolynomialControls};
 use super::units::Units;
 use super::{Model, Variables};
 use crate::graph::{Binary, Node};
@@ -21,9 +22,11 @@ use syn::{Error, Expr, FnArg, ItemFn, Pat, Result, Token};
 /// The index of a missing rate.
 const ABSENT_RATE: usize = u32::MAX as usize;
 
-/// The linear controls and integrals of a model's attribute.
+/// The linear controls, polynomial controls and integrals of a model's attribute.
 #[derive(Clone, Default)]
 pub struct AugmentedStates {
+    /// The controls that are polynomials in every interval.
+    pub polynomials: PolynomialControls,
     /// The names of linear controls, as written.
     pub linear: Vec<(String, Span)>,
     /// The integrals.
@@ -44,6 +47,10 @@ pub struct Extra {
     pub linear: Vec<u32>,
     /// The number of integrals.
     pub integrals: usize,
+    /// The degree of each control as written; empty without polynomial controls.
+    pub degrees: Vec<u32>,
+    /// Whether a function depends on the time other than by polynomial controls.
+    pub is_timed: bool,
 }
 
 impl Parse for Integral {
@@ -83,10 +90,27 @@ pub fn names(span: Span, value: &Expr) -> Vec<(String, Span)> {
     }
 }
 
+/// The indices of the controls with a name: `u` denotes `u[0]`, `u[1]`, ….
+pub fn indices_of_name(name: &str, span: Span, controls: &[String]) -> Result<Vec<u32>> {
+    let is_denoted = |control: &String| {
+        let rest = control.strip_prefix(name);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    let found: Vec<u32> = (0..).zip(controls).filter(|(_, c)| is_denoted(c)).map(|(i, _)| i).collect();
+    if found.is_empty() {
+        let known = match controls {
+            [] => "it has none".to_owned(),
+            names => format!("these are `{}`", names.join("`, `")),
+        };
+        return Err(Error::new(span, format!("`{name}` is no control of the model: {known}")));
+    }
+    Ok(found)
+}
+
 impl AugmentedStates {
-    /// Whether there are no linear controls and integrals.
+    /// Whether there are no linear controls, polynomial controls and integrals.
     pub fn is_empty(&self) -> bool {
-        self.linear.is_empty() && self.integrals.is_empty()
+        self.linear.is_empty() && self.integrals.is_empty() && self.polynomials.is_empty()
     }
 
     /// These, or those of the module's model if there are none.
@@ -113,18 +137,7 @@ impl AugmentedStates {
     fn linear(&self, controls: &[String]) -> Result<Vec<u32>> {
         let mut linear = Vec::new();
         for (name, span) in &self.linear {
-            let meant = |control: &String| {
-                let rest = control.strip_prefix(name.as_str());
-                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-            };
-            let found: Vec<u32> = (0..).zip(controls).filter(|(_, c)| meant(c)).map(|(i, _)| i).collect();
-            if found.is_empty() {
-                let known = match controls {
-                    [] => "it has none".to_owned(),
-                    names => format!("these are `{}`", names.join("`, `")),
-                };
-                return Err(Error::new(*span, format!("`{name}` is no control of the model: {known}")));
-            }
+            let found = indices_of_name(name, *span, controls)?;
             if found.iter().any(|control| linear.contains(control)) {
                 return Err(Error::new(*span, format!("`{name}` is linear already")));
             }
@@ -142,6 +155,7 @@ impl AugmentedStates {
         }
         let Variables { x, z, u, p } = &model.variables;
         let linear = self.linear(u)?;
+        let degrees = self.polynomials.degrees(u, &linear)?;
         let [nx, nz, nu, np, more] = [x.len(), z.len(), u.len(), p.len(), linear.len()];
         let integrals = self.integrals.len();
         let states = nx + more + integrals;
@@ -157,7 +171,11 @@ impl AugmentedStates {
             let place = linear.iter().position(|&other| other as usize == control);
             put(graph, of_u + control, place.map_or(after + control, |place| states + nx + place));
             if control < of_du {
-                let to = if place.is_some() { after + control } else { ABSENT_RATE };
+                let to = match degrees.get(control) {
+                    _ if place.is_some() => after + control,
+                    Some(1..) => polynomial_controls::RATES as usize + control,
+                    _ => ABSENT_RATE,
+                };
                 put(graph, of_u + nu + np + 1 + control, to);
             }
         }
@@ -168,7 +186,7 @@ impl AugmentedStates {
         model.residual = graph.substitute(&model.residual, &by);
         let none = graph.variable(ABSENT_RATE as u32);
         if graph.reachable(&model.residual).contains(&none) {
-            let message = "an element of `du` is the rate of a piecewise constant control: list this control in `linear = ..`";
+            let message = "an element of `du` is the rate of a piecewise constant control: list this control in `linear = ..` or `degree(..)`";
             return Err(Error::new(model.name.span(), message));
         }
         if is_model {
@@ -181,7 +199,7 @@ impl AugmentedStates {
             }
         }
         self.name(model, &linear);
-        model.extra = Extra { linear, integrals };
+        model.extra = Extra { linear, integrals, degrees, is_timed: false };
         Ok(())
     }
 
@@ -212,7 +230,7 @@ impl AugmentedStates {
     /// integrals.
     pub fn check(&self, function: &ItemFn, controls: usize, [of_du, of_q]: [usize; 2]) -> Result<()> {
         let name = &function.sig.ident;
-        if of_du > 0 && self.linear.is_empty() {
+        if of_du > 0 && self.linear.is_empty() && self.polynomials.is_empty() {
             let message = "`du` are rates of controls that are linear: say which ones, as in `linear = u`";
             return Err(Error::new(name.span(), message));
         }

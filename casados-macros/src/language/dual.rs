@@ -102,7 +102,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
         return Err(Error::new(duration.span, message));
     }
     if !arguments.extension.is_empty() {
-        let message = "`linear` and `integrals` need a graph model: write the model with `f64`";
+        let message = "`linear`, `degree` and `integrals` need a graph model: write the model with `f64`";
         return Err(Error::new_spanned(&function.sig.ident, message));
     }
     let mut consts = function.sig.generics.clone();

@@ -30,17 +30,22 @@ impl Duration {
         Self { name: tokens.to_string().chars().filter(|c| !c.is_whitespace()).collect(), span }
     }
 
-    /// Replaces the time of a model by that of its integrator.
-    pub fn scale(&self, model: &mut Model, is_function: bool) -> Result<()> {
-        let variables = &model.variables;
-        let Some(index) = variables.p.iter().position(|name| *name == self.name) else {
-            let known = match &variables.p[..] {
+    /// The index among these parameters.
+    pub fn index(&self, parameters: &[String]) -> Result<u32> {
+        let position = parameters.iter().position(|name| *name == self.name);
+        position.map(|index| index as u32).ok_or_else(|| {
+            let known = match parameters {
                 [] => "it has none".to_owned(),
                 names => format!("these are `{}`", names.join("`, `")),
             };
-            let message = format!("`{}` is no parameter of the model: {known}", self.name);
-            return Err(Error::new(self.span, message));
-        };
+            Error::new(self.span, format!("`{}` is no parameter of the model: {known}", self.name))
+        })
+    }
+
+    /// Replaces the time of a model by that of its integrator.
+    pub fn scale(&self, model: &mut Model, is_function: bool) -> Result<()> {
+        let variables = &model.variables;
+        let index = self.index(&variables.p)?;
         if model.reduction.is_some() {
             let message = "`duration` does not support `index_reduction`: differentiate constraints by hand";
             return Err(Error::new(self.span, message));
@@ -49,13 +54,13 @@ impl Duration {
         let first = (2 * nx + nz + nu) as u32;
         let time = first + variables.p.len() as u32;
         let graph = &mut model.graph;
-        let (duration, tau) = (graph.variable(first + index as u32), graph.variable(time));
+        let (duration, tau) = (graph.variable(first + index), graph.variable(time));
         let seconds = graph.binary(Binary::Mul, duration, tau);
         model.residual = graph.substitute(&model.residual, &BTreeMap::from([(time, seconds)]));
         if !is_function {
             model.residual = scaled_residual(graph, &model.residual, nx as u32, duration);
         }
-        model.duration = Some(index as u32);
+        model.duration = Some(index);
         Ok(())
     }
 }

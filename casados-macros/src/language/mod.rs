@@ -32,6 +32,7 @@ mod operator;
 mod path;
 mod pattern;
 mod place;
+mod polynomial_controls;
 mod reduction;
 mod sampling;
 mod select;
@@ -265,6 +266,7 @@ fn model_and_functions(
             let mut own = own;
             if form == Form::Function {
                 own.extension = own.extension.or(&arguments.extension);
+                own.extension.polynomials.duration.clone_from(&arguments.duration);
             }
             let models = models(&own, &template(form, index, None, &own)?)?;
             Ok(Some(ModelOrFunctions { form, original: function.sig.ident.clone(), models }))
@@ -293,11 +295,12 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
     let instances = arguments.instances(&template.function.sig.generics)?;
     let model = |instance| {
         let mut model = template.instantiate(instance, &arguments.extension)?;
-        model.samplings = arguments.samplings(&model.variables)?;
         model.reduction.clone_from(&arguments.reduction);
         if let Some(duration) = &arguments.duration {
             duration.scale(&mut model, template.form == Form::Function)?;
         }
+        arguments.extension.polynomials.expand(&mut model)?;
+        model.samplings = arguments.samplings(&model.variables)?;
         Ok(model)
     };
     instances.into_iter().map(model).collect()

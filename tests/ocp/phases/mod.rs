@@ -2,6 +2,7 @@
 
 mod bounce;
 mod collocated;
+mod derivatives;
 pub mod kkt;
 mod launch;
 mod mistakes;

@@ -163,6 +163,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
             units: F::UNITS,
             duration: None,
             linear: &[],
+            degrees: &[],
             integrals: 0,
         }
     };

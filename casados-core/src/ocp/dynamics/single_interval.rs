@@ -33,6 +33,7 @@ pub(in crate::ocp) const fn names<M: Dae>() -> Names {
         units: M::UNITS,
         duration: M::DURATION,
         linear: M::LINEAR,
+        degrees: M::DEGREES,
         integrals: M::INTEGRALS,
     }
 }

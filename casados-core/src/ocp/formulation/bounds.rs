@@ -230,7 +230,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<&mut Self, OcpError> {
         let intervals = self.intervals();
         let range = stage_range(Part::Parameters, &stages, intervals + 1)?;
-        Labels::parameters::<P, T>(Part::Parameters, range.start).check_vector(p, P::Shape::NP)?;
+        let count = self.names().model_parameter_count();
+        Labels::parameters::<P, T>(Part::Parameters, range.start).check_vector(p, count)?;
         let layout = self.layout();
         let data = split_data::<P, T>(self.data.as_mut(), layout);
         for k in range {

@@ -55,8 +55,10 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// ```
     pub fn free(&mut self, name: &str, range: impl RangeBounds<T>, guess: T) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
-        let matching_parameters =
-            || known.p.iter().enumerate().filter(|(_, parameter)| name_matches(name, parameter));
+        let matching_parameters = || {
+            let model_parameters = known.p.iter().take(known.model_parameter_count());
+            model_parameters.enumerate().filter(|(_, parameter)| name_matches(name, parameter))
+        };
         let Some((first, &name_of_first)) = matching_parameters().next() else {
             return Err(OcpError::UnknownParameter { name: Text::new(name), known });
         };

@@ -9,10 +9,13 @@
 //! | `free_parameters_and_points` | adding free parameters, and points inside intervals |
 //! | `bounds`, `variable_bounds`, `soften` | bounds and penalties |
 //! | `coupling`, `arrival` | couplings and arrival cost |
+//! | `bernstein` | values and parts of polynomial controls |
 //! | `names`, `labels`, `check`, `error` | errors by name |
 //! | `print` | a problem as formulas |
 
 pub(in crate::ocp) mod arrival;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod bernstein;
 pub(in crate::ocp) mod bounds;
 pub(in crate::ocp) mod check;
 pub(in crate::ocp) mod coupling;

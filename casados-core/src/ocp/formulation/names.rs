@@ -2,6 +2,9 @@
 
 use crate::structure::Units;
 
+/// Start and length of an interval, the last parameters of models with polynomial controls.
+pub(in crate::ocp) const INTERVAL_PARAMETERS: usize = 2;
+
 /// Names of the variables of a model.
 ///
 /// ```
@@ -39,6 +42,9 @@ pub struct Names {
     /// The controls that are rates of linear controls. Linear controls are states that follow the
     /// model's states.
     pub linear: &'static [u32],
+    /// The degree of each control as written, if some are polynomials in every interval, whose
+    /// coefficients are controls (`#[ode(degree(u = 1))]`); otherwise empty.
+    pub degrees: &'static [u32],
     /// The number of integrals, which are the last states.
     pub integrals: usize,
 }
@@ -49,11 +55,45 @@ impl Names {
         self.x.len() - self.linear.len() - self.integrals
     }
 
-    /// Returns the name of a control; for a rate, the name of the linear control.
+    /// Returns the number of controls as written, without the coefficients of polynomials.
+    pub(in crate::ocp) const fn model_control_count(&self) -> usize {
+        if self.degrees.is_empty() { self.u.len() } else { self.degrees.len() }
+    }
+
+    /// Returns the number of parameters as written, without start and length of an interval.
+    pub(in crate::ocp) const fn model_parameter_count(&self) -> usize {
+        if self.degrees.is_empty() { self.p.len() } else { self.p.len() - INTERVAL_PARAMETERS }
+    }
+
+    /// Returns each control as written: its first coefficient and its degree.
+    pub(in crate::ocp) fn model_controls(&self) -> impl Iterator<Item = (usize, usize)> {
+        let mut next = 0;
+        (0..self.model_control_count()).map(move |control| {
+            let first = next;
+            let degree = self.degrees.get(control).map_or(0, |&degree| degree as usize);
+            next += degree + 1;
+            (first, degree)
+        })
+    }
+
+    /// Returns the first coefficient and the degree of the control with a coefficient, if it is a
+    /// polynomial.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn polynomial_of(&self, coefficient: usize) -> Option<(usize, usize)> {
+        let mut controls = self.model_controls();
+        controls.find(|&(first, degree)| degree > 0 && (first..=first + degree).contains(&coefficient))
+    }
+
+    /// Returns the name of a control as written: of a rate that of the linear control, of a
+    /// coefficient that of the polynomial.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn control_name(&self, control: usize) -> &'static str {
         let state = self.linear_state(control).and_then(|state| self.x.get(state));
-        state.or(self.u.get(control)).copied().unwrap_or("")
+        let name = state.or(self.u.get(control)).copied().unwrap_or("");
+        match self.polynomial_of(control) {
+            Some(_) => name.rfind('[').and_then(|bracket| name.get(..bracket)).unwrap_or(name),
+            None => name,
+        }
     }
 
     /// Returns the index of a linear control among the states.

@@ -5,7 +5,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::ocp::formulation::functions::constraint::{Constraint, ConstraintContext, Constraints};
 use crate::ocp::formulation::functions::node_evaluation::{
-    AvailableVariables, QuadraticTerms, write_variables,
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, write_variables,
 };
 use crate::qp::element::set;
 use crate::qp::{copy_common, part_mut};
@@ -72,6 +72,16 @@ pub trait Link<T: Real> {
         values: &mut [T],
         columns: (&mut [T], usize),
     ) -> Result<(), OcpError>;
+    /// Evaluates `∂y/∂p` of the next state, a row over the parameters for each state, and adds the
+    /// derivatives with respect to parameters of the gradient, weighted by these multipliers.
+    #[doc(hidden)]
+    fn add_parameter_derivatives(
+        &mut self,
+        end: PhaseEnd<'_, T>,
+        multipliers: &[T],
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
+    );
     /// Adds its second derivatives, weighted by these multipliers.
     #[doc(hidden)]
     fn add_hessian(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut QuadraticTerms<'_, T>);
@@ -114,6 +124,14 @@ impl<T: Real> Link<T> for Continuous {
         Ok(())
     }
     fn add_hessian(&mut self, _: PhaseEnd<'_, T>, _: &[T], _: &mut QuadraticTerms<'_, T>) {}
+    fn add_parameter_derivatives(
+        &mut self,
+        _: PhaseEnd<'_, T>,
+        _: &[T],
+        _: &mut [T],
+        _: &mut ParameterDerivatives<'_, T>,
+    ) {
+    }
 }
 
 /// The states of the next phase are a function of the states and parameters at the end of a phase:
@@ -185,7 +203,8 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
             check_dimension(name, argument, [expected, found])?;
         }
         check_dimension(name, "output", [dims.next_states, F::Outputs::NY])?;
-        AvailableVariables { z: false, u: false, stage: dims.stage, t: dims.is_timed }.check::<F>()
+        AvailableVariables { z: false, u: false, stage: dims.stage, t: dims.is_timed, degrees: &[] }
+            .check::<F>()
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
         self.load_variables(end);
@@ -214,6 +233,17 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
             ConstraintContext::new(end.stage, end.free, &[]),
             terms,
         );
+    }
+    fn add_parameter_derivatives(
+        &mut self,
+        end: PhaseEnd<'_, T>,
+        multipliers: &[T],
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
+    ) {
+        self.load_variables(end);
+        let context = ConstraintContext::new(end.stage, end.free, &[]);
+        self.function.add_parameter_derivatives(&self.v, Some(multipliers), context, slopes, cross);
     }
 }
 

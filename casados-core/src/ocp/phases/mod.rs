@@ -14,16 +14,20 @@
 //! | `phase` | a phase, independent of the type of its problem |
 //! | `stage_conversion` | points, bounds and QPs of phases and of the joined problem |
 //! | `program` | the interface to solvers |
+//! | `derivatives` | derivatives of solutions and values |
 
+mod derivatives;
+mod dynamics;
 mod link;
 mod phase;
 mod program;
 mod stage_conversion;
 
+pub use derivatives::{PhaseAdjoint, PhaseDirection, PhaseFactors};
+pub use dynamics::PhaseDynamics;
 pub use link::{Continuous, Jump, Link};
 #[doc(hidden)]
 pub use link::{PhaseDims, PhaseEnd};
-pub use program::PhaseDynamics;
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParameters;
@@ -32,9 +36,7 @@ use crate::ocp::formulation::instance::inner_points::InnerPoints;
 use crate::ocp::formulation::instance::{HeapOcp, InitialState, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::ends;
-use crate::qp::{
-    HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, try_reserve, zeros,
-};
+use crate::qp::{HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, try_reserve, zeros};
 use crate::scalar::Real;
 use crate::structure::name_matches;
 use alloc::boxed::Box;
@@ -223,7 +225,8 @@ impl<'a, T: Real> Phases<'a, T> {
             self.trial_points
                 .push(TrialPoint { point: Solution::new(phase_dims)?, ends: zeros(ends(phase_dims))? });
         }
-        let (rows, scratch) = (dims.iter().map(|stage| stage.ng).sum::<usize>(), scratch_len::<T>(&dims));
+        let (rows, scratch) =
+            (dims.iter().map(|stage| stage.ng).sum::<usize>(), stage_conversion::scratch_len::<T>(&dims));
         let mut ocp = Ocp {
             qp: Qp::new(&dims)?,
             iterate: Solution::new(&dims)?,
@@ -273,10 +276,10 @@ impl<'a, T: Real> Phases<'a, T> {
 
     /// Returns the fixed elements of the first state.
     fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
-        let Some(JoinedPhase { problem, start: begin, .. }) = self.phases.first() else {
+        let Some(JoinedPhase { problem, start: phase_start, .. }) = self.phases.first() else {
             return Ok(Vec::new());
         };
-        let mut start = zeros(begin.size.given_states)?;
+        let mut start = zeros(phase_start.size.given_states)?;
         if let Some(first) = problem.qp().stage(0) {
             copy_common(&mut start, first.x_bounds().lower);
         }
@@ -294,12 +297,12 @@ impl<'a, T: Real> Phases<'a, T> {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
         let mut previous_stage = stages.next();
-        for (index, JoinedPhase { problem, start: begin, .. }) in self.phases.iter_mut().enumerate() {
+        for (index, JoinedPhase { problem, start: phase_start, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
                 if k == 0
                     && let Some(mut previous) = previous_stage.take()
                 {
-                    stage_conversion::write_start_variable_bounds(begin, &from, &mut previous);
+                    stage_conversion::write_start_variable_bounds(phase_start, &from, &mut previous);
                 }
                 let Some(mut to) = stages.next() else { return };
                 let position = match (index, k) {
@@ -307,7 +310,7 @@ impl<'a, T: Real> Phases<'a, T> {
                     (_, 0) => StagePosition::PhaseStart,
                     _ => StagePosition::InteriorStage,
                 };
-                stage_conversion::copy_stage_bounds(begin, &from, &mut to, position);
+                stage_conversion::copy_stage_bounds(phase_start, &from, &mut to, position);
                 previous_stage = Some(to);
             }
             for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given_constraint_bounds()) {
@@ -324,15 +327,15 @@ impl<'a, T: Real> Phases<'a, T> {
             || self.phases.iter().map(|phase| (&phase.start, phase.problem.iterate().stages().next()));
         let nexts = first_stages().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
-            let next = next.and_then(|(begin, first)| Some((begin, first?)));
+            let next = next.and_then(|(phase_start, first)| Some((phase_start, first?)));
             let size = phase.start.size;
             let stages = phase.problem.iterate().stages().enumerate();
             stages.map(move |(k, stage)| (size, stage, next.filter(|_| k == size.intervals)))
         });
-        let mut start = first_stages().next().and_then(|(begin, first)| Some((begin, first?)));
+        let mut start = first_stages().next().and_then(|(phase_start, first)| Some((phase_start, first?)));
         to.each_stage_mut(|to| {
-            if let Some((begin, first)) = start.take() {
-                stage_conversion::write_start_variables(begin, &first, to.u, to.u_lower, to.u_upper);
+            if let Some((phase_start, first)) = start.take() {
+                stage_conversion::write_start_variables(phase_start, &first, to.u, to.u_lower, to.u_upper);
             } else if let Some((size, from, next)) = stages.next() {
                 stage_conversion::store_phase_stage(size, &from, to, next);
             }
@@ -342,8 +345,8 @@ impl<'a, T: Real> Phases<'a, T> {
     /// Reads a point of the joined problem to the iterates of the phases.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
-        for JoinedPhase { problem, start: begin, .. } in &mut self.phases {
-            before = stage_conversion::load_phase(begin, &mut stages, problem.iterate_mut(), before);
+        for JoinedPhase { problem, start: phase_start, .. } in &mut self.phases {
+            before = stage_conversion::load_phase(phase_start, &mut stages, problem.iterate_mut(), before);
         }
     }
 }
@@ -386,14 +389,4 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
         }
         Ok(())
     }
-}
-
-/// Returns the length of two matrices and a vector over the variables of a stage, or of four
-/// vectors.
-fn scratch_len<T>(dims: &[StageDims]) -> usize {
-    let of_stage = |stage: &StageDims| {
-        let n = stage.nx + stage.nu;
-        (2 * n + 4) * padded_len::<T>(n)
-    };
-    dims.iter().map(of_stage).max().unwrap_or(0)
 }

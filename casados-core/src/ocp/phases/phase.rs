@@ -2,6 +2,7 @@
 
 use super::link::{PhaseDims, PhaseEnd};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
+use crate::ocp::formulation::free_parameters::FreeParameters;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::names::Names;
@@ -9,6 +10,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Exact, GaussNewton};
 use crate::ocp::formulation::program::{Program, ProgramParts};
+use crate::ocp::solution::sensitivities::parameters::KktParameterDerivatives;
 use crate::qp::{
     HeapSolution, QpError, QpField, QpView, Side, SolutionStage, copy_common, marked_indices, part,
 };
@@ -73,11 +75,18 @@ impl PhaseStart {
 pub(super) trait Phase<T: Real> {
     fn size(&self) -> PhaseSize;
     fn names(&self) -> Names;
+    fn static_names(&self) -> &'static Names;
+    /// Returns memory for derivatives with respect to parameters.
+    fn parameter_derivatives(&self) -> Result<KktParameterDerivatives<T>, OcpError>;
+    /// Writes the QP with exact Hessians and the derivatives with respect to parameters at the
+    /// iterate, and returns the objective.
+    fn differentiate(&mut self, result: &mut KktParameterDerivatives<T>) -> Result<T, OcpError>;
+    fn free_parameters(&self) -> &FreeParameters;
     /// Returns the index of a parameter of the model among the free parameters.
     fn free_index(&self, parameter: usize) -> Option<usize>;
-    /// Returns the dimensions that a link at its end must match; `begins` is the number of states
-    /// of the next phase.
-    fn link_dims(&self, begins: usize) -> PhaseDims;
+    /// Returns the dimensions that a link at its end must match; `next_states` is the number of
+    /// states of the next phase.
+    fn link_dims(&self, next_states: usize) -> PhaseDims;
     /// Returns a feature that phases do not support. Frees the start of every phase but the first.
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
@@ -135,14 +144,27 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn names(&self) -> Names {
         <P::Dynamics as Dynamics<T>>::NAMES
     }
+    fn static_names(&self) -> &'static Names {
+        const { &<P::Dynamics as Dynamics<T>>::NAMES }
+    }
+    fn free_parameters(&self) -> &FreeParameters {
+        &self.free
+    }
+    fn parameter_derivatives(&self) -> Result<KktParameterDerivatives<T>, OcpError> {
+        KktParameterDerivatives::new::<P>(self.free.count(), self.intervals())
+    }
+    fn differentiate(&mut self, result: &mut KktParameterDerivatives<T>) -> Result<T, OcpError> {
+        self.differentiate_with(Exact { convexification: Convexification::None }, result)?;
+        Ok(self.objective)
+    }
     fn free_index(&self, parameter: usize) -> Option<usize> {
         self.free.view().index_of(parameter)
     }
-    fn link_dims(&self, begins: usize) -> PhaseDims {
+    fn link_dims(&self, next_states: usize) -> PhaseDims {
         PhaseDims {
             ending_dims: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
             model_states: self.names().model_state_count(),
-            next_states: begins,
+            next_states,
             stage: self.intervals(),
             is_timed: self.free.view().end_time_index().is_none(),
         }

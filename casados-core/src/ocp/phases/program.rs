@@ -1,16 +1,16 @@
 //! The program of joined phases: each phase provides its stages, links the steps between phases.
 
+use super::dynamics::PhaseDynamics;
 use super::link::{Link, PhaseEnd};
 use super::phase::{Kind, Phase, PhaseSize, PhaseStart};
 use super::{JoinedPhase, Phases, TrialPoint, stage_conversion};
 use crate::linalg::dot;
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
-use crate::ocp::formulation::functions::dynamics::{Nodes, Sink, StageAction, add_stage_residuals};
+use crate::ocp::formulation::functions::dynamics::{StageAction, add_stage_residuals};
 use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::program::curvature::Convexification;
-use crate::ocp::formulation::program::curvature::{Curvature, Exact, GaussNewton};
+use crate::ocp::formulation::program::curvature::{Convexification, Curvature};
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::qp::{
     Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric_product, check,
@@ -18,46 +18,6 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 use core::ops::Range;
-
-/// The type of dynamics that a [`Curvature`] of [`Phases`] is generic over; each phase linearises
-/// its own.
-///
-/// No value has this type.
-///
-/// ```
-/// use casados::ocp::{Curvature, Exact, PhaseDynamics};
-///
-/// fn is_exact<C: Curvature<PhaseDynamics, f64>>(_: C) -> bool { C::EXACT }
-/// assert!(is_exact(Exact::default()));
-/// ```
-#[derive(Clone, Copy, Debug)]
-pub enum PhaseDynamics {}
-
-macro_rules! curvatures {
-    ($($number:ty, $curvature:ty, $exact:expr;)*) => {$(
-        impl Curvature<PhaseDynamics, $number> for $curvature {
-            const EXACT: bool = $exact;
-            fn convexification(&self) -> Convexification {
-                self.convexification
-            }
-            fn run(
-                self,
-                dynamics: &mut PhaseDynamics,
-                _: &Nodes<'_, $number>,
-                _: Sink<'_, $number>,
-            ) -> Result<(), OcpError> {
-                match *dynamics {}
-            }
-        }
-    )*};
-}
-
-curvatures! {
-    f64, Exact, true;
-    f32, Exact, true;
-    f64, GaussNewton, false;
-    f32, GaussNewton, false;
-}
 
 /// For `f64` and `f32` only: with a generic number this implementation would conflict with that for
 /// every [`Formulation`](crate::ocp::Formulation).
@@ -184,16 +144,34 @@ macro_rules! programs {
 
 programs!(f64, f32);
 
-/// Writes the QP at the iterate, and returns the objective.
+/// Writes the QP at the iterate.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
     kind: Kind,
+) -> Result<(), OcpError> {
+    write_linearised(ocp, kind, |_, phase| phase.linearise(kind))
+}
+
+/// Writes the QP with exact Hessians at the iterate, from phases that `linearise` linearises.
+pub(super) fn write_with<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
+    linearise: impl FnMut(usize, &mut dyn Phase<T>) -> Result<T, OcpError>,
+) -> Result<(), OcpError> {
+    write_linearised(ocp, Kind { exact: true, convexification: Convexification::None }, linearise)
+}
+
+/// Writes the QP at the iterate. `linearise` writes that of a phase, and returns its objective.
+fn write_linearised<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
+    kind: Kind,
+    mut linearise: impl FnMut(usize, &mut dyn Phase<T>) -> Result<T, OcpError>,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
     ocp.problem.set_step_length(ocp.step_length);
     let mut objective = T::ZERO;
     for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
-        objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
+        let of_phase = linearise(index, phase.problem).map_err(|error| error.in_phase(index))?;
+        objective = objective + of_phase;
     }
     ocp.objective = objective;
     ocp.stage_residuals = ocp.problem.stage_residuals();

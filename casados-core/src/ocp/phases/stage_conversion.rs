@@ -11,15 +11,15 @@
 use super::phase::{PhaseSize, PhaseStart};
 use crate::qp::element::set;
 use crate::qp::{
-    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, copy_common,
-    part, part_mut,
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageDims, StageMut,
+    copy_common, padded_len, part, part_mut,
 };
 use crate::scalar::Real;
 
 /// Reads a point of the joined problem at the stages of a phase. The start of the phase is decided
 /// at `previous_stage`; returns the last stage of the phase.
 pub(super) fn load_phase<'s, T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
     to: &mut HeapSolution<T>,
     previous_stage: Option<SolutionStage<'s, T>>,
@@ -27,19 +27,19 @@ pub(super) fn load_phase<'s, T: Real>(
     let (mut last, mut start_stage) = (None, previous_stage);
     to.each_stage_mut(|to| {
         let Some(from) = from.next() else { return };
-        load_phase_stage(begin, &from, to, start_stage.take());
+        load_phase_stage(phase_start, &from, to, start_stage.take());
         last = Some(from);
     });
     last
 }
 
 fn load_phase_stage<T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     from: &SolutionStage<'_, T>,
     to: SolutionStageMut<'_, T>,
     previous_stage: Option<SolutionStage<'_, T>>,
 ) {
-    let PhaseSize { nx, free, .. } = begin.size;
+    let PhaseSize { nx, free, .. } = phase_start.size;
     for (x, u, to_x, to_u) in [
         (from.x, from.u, to.x, &mut *to.u),
         (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
@@ -59,7 +59,7 @@ fn load_phase_stage<T: Real>(
         for (from, x, u) in
             [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
         {
-            scatter_start_variables(begin, from, x, u);
+            scatter_start_variables(phase_start, from, x, u);
         }
     }
 }
@@ -86,15 +86,15 @@ pub(super) fn store_phase_stage<T: Real>(
     copy_common(to.dynamics, from.dynamics);
     copy_common(to.g_lower, from.g_lower);
     copy_common(to.g_upper, from.g_upper);
-    if let Some((begin, next)) = next {
-        write_start_variables(begin, &next, to.u, to.u_lower, to.u_upper);
+    if let Some((phase_start, next)) = next {
+        write_start_variables(phase_start, &next, to.u, to.u_lower, to.u_upper);
     }
 }
 
 /// Writes the variables that are decided at the start of a phase, from its first stage, with the
 /// multipliers of their bounds.
 pub(super) fn write_start_variables<T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     first: &SolutionStage<'_, T>,
     to: &mut [T],
     lower: &mut [T],
@@ -103,28 +103,28 @@ pub(super) fn write_start_variables<T: Real>(
     for (to, x, u) in
         [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
     {
-        gather_start_variables(begin, x, u, to);
+        gather_start_variables(phase_start, x, u, to);
     }
 }
 
 /// Gathers the elements that are decided at the start of a phase, from a vector over its first
 /// states and controls: free states, then free parameters.
-fn gather_start_variables<T: Real>(begin: &PhaseStart, x: &[T], u: &[T], to: &mut [T]) {
-    let size = begin.size;
+fn gather_start_variables<T: Real>(phase_start: &PhaseStart, x: &[T], u: &[T], to: &mut [T]) {
+    let size = phase_start.size;
     let (states, parameters) = to.split_at_mut_checked(size.free_start_states().len()).unwrap_or_default();
     copy_common(states, x.get(size.free_start_states()).unwrap_or_default());
-    for (to, w) in parameters.iter_mut().zip(begin.parameters()) {
+    for (to, w) in parameters.iter_mut().zip(phase_start.parameters()) {
         copy_common(core::slice::from_mut(to), part(u, w, 1));
     }
 }
 
 /// Scatters the decision variables at the start of a phase: the inverse of
 /// [`gather_start_variables`].
-fn scatter_start_variables<T: Real>(begin: &PhaseStart, decided: &[T], x: &mut [T], u: &mut [T]) {
-    let size = begin.size;
+fn scatter_start_variables<T: Real>(phase_start: &PhaseStart, decided: &[T], x: &mut [T], u: &mut [T]) {
+    let size = phase_start.size;
     let (states, parameters) = decided.split_at_checked(size.free_start_states().len()).unwrap_or_default();
     copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
-    for (&from, w) in parameters.iter().zip(begin.parameters()) {
+    for (&from, w) in parameters.iter().zip(phase_start.parameters()) {
         set(u, w, from);
     }
 }
@@ -154,12 +154,12 @@ pub(super) enum StagePosition {
 /// Copies the bounds of a stage, except bounds of variables decided at the stage before, and of
 /// integrals at the start of a phase.
 pub(super) fn copy_stage_bounds<T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     from: &Stage<'_, T>,
     to: &mut StageMut<'_, T>,
     position: StagePosition,
 ) {
-    let PhaseSize { nx, free, model_states: own, .. } = begin.size;
+    let PhaseSize { nx, free, model_states: own, .. } = phase_start.size;
     let control_bounds = bound_vectors(&from.u_bounds());
     let count = match position {
         StagePosition::FirstStage => 0,
@@ -171,7 +171,7 @@ pub(super) fn copy_stage_bounds<T: Real>(
         .zip(bound_vectors(&from.x_bounds()).into_iter().zip(control_bounds))
     {
         copy_common(part_mut(to, 0, count), x);
-        for (w, shared) in begin.shared.iter().enumerate() {
+        for (w, shared) in phase_start.shared.iter().enumerate() {
             if position == StagePosition::InteriorStage
                 || position == StagePosition::PhaseStart && shared.is_some()
             {
@@ -190,23 +190,28 @@ pub(super) fn copy_stage_bounds<T: Real>(
 /// Writes the bounds of the variables that are decided at the start of a phase, from its first
 /// stage.
 pub(super) fn write_start_variable_bounds<T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     first: &Stage<'_, T>,
     to: &mut StageMut<'_, T>,
 ) {
     let first_bounds = bound_vectors(&first.x_bounds()).into_iter().zip(bound_vectors(&first.u_bounds()));
     for (to, (x, u)) in bound_vectors_mut(to.u_bounds_mut()).into_iter().zip(first_bounds) {
-        gather_start_variables(begin, x, u, to);
+        gather_start_variables(phase_start, x, u, to);
     }
 }
 
 /// Writes the start of a phase: the decision variables `decided`, and the parameters shared with
 /// the phase before from `before`; other elements are zero unless given.
-pub(super) fn write_start_state<T: Real>(begin: &PhaseStart, decided: &[T], before: &[T], start: &mut [T]) {
-    let (x, w) = start.split_at_mut_checked(begin.size.nx).unwrap_or_default();
-    x.get_mut(begin.size.given_states..).unwrap_or_default().fill(T::ZERO);
-    scatter_start_variables(begin, decided, x, w);
-    for (w, shared) in w.iter_mut().zip(&begin.shared) {
+pub(super) fn write_start_state<T: Real>(
+    phase_start: &PhaseStart,
+    decided: &[T],
+    before: &[T],
+    start: &mut [T],
+) {
+    let (x, w) = start.split_at_mut_checked(phase_start.size.nx).unwrap_or_default();
+    x.get_mut(phase_start.size.given_states..).unwrap_or_default().fill(T::ZERO);
+    scatter_start_variables(phase_start, decided, x, w);
+    for (w, shared) in w.iter_mut().zip(&phase_start.shared) {
         if let Some(shared) = *shared {
             copy_common(core::slice::from_mut(w), part(before, shared, 1));
         }
@@ -216,16 +221,18 @@ pub(super) fn write_start_state<T: Real>(begin: &PhaseStart, decided: &[T], befo
 /// Writes the columns of [`write_start_state`] to the QP; the decision variables begin at `first`,
 /// the parameters of the phase before at `before`.
 pub(super) fn write_start_columns<T: Real>(
-    begin: &PhaseStart,
+    phase_start: &PhaseStart,
     [before, first]: [usize; 2],
     columns: &mut [T],
     ld: usize,
 ) {
-    let nx = begin.size.nx;
-    for (j, state) in begin.size.free_start_states().chain(begin.parameters().map(|w| nx + w)).enumerate() {
+    let nx = phase_start.size.nx;
+    for (j, state) in
+        phase_start.size.free_start_states().chain(phase_start.parameters().map(|w| nx + w)).enumerate()
+    {
         set(columns, state * ld + first + j, T::ONE);
     }
-    for (w, shared) in begin.shared.iter().enumerate() {
+    for (w, shared) in phase_start.shared.iter().enumerate() {
         if let Some(shared) = *shared {
             set(columns, (nx + w) * ld + before + shared, T::ONE);
         }
@@ -272,4 +279,14 @@ pub(super) fn copy_stage_qp<T: Real>(
     let (lower, rest) = limits.split_at_mut_checked(*rows).unwrap_or_default();
     copy_common(part_mut(lower, ld, bounds.lower.len()), bounds.lower);
     copy_common(part_mut(rest, ld, bounds.upper.len()), bounds.upper);
+}
+
+/// Returns the length of two matrices and a vector over the variables of a stage, or of four
+/// vectors.
+pub(super) fn scratch_len<T>(dims: &[StageDims]) -> usize {
+    let of_stage = |stage: &StageDims| {
+        let n = stage.nx + stage.nu;
+        (2 * n + 4) * padded_len::<T>(n)
+    };
+    dims.iter().map(of_stage).max().unwrap_or(0)
 }

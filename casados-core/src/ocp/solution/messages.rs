@@ -225,8 +225,8 @@ impl fmt::Display for OcpError {
                  `Ocp::differentiate`",
             ),
             Self::FreeParameters => f.write_str(
-                "derivatives of solutions do not support free parameters: fix them with `set_parameters`, or make \
-                 them states",
+                "feedback gains and functions of CasADi do not support free parameters: fix them with \
+                 `set_parameters`, or make them states",
             ),
             Self::NoSolution => f.write_str(
                 "the last run found no solution to differentiate (see its outcome)",
@@ -237,6 +237,15 @@ impl fmt::Display for OcpError {
                  `#[ode(duration = p.duration)]`"
             ),
             Self::Unsupported { what, remedy } => write!(f, "not supported: {what}. {remedy}"),
+            Self::NoSuchPhase { phase, phases } => {
+                write!(f, "there is no phase {phase}: there are {phases}, counted from 0")
+            }
+            Self::CostAtNodes { function, coefficient } => write!(
+                f,
+                "the running cost `{function}` depends on `{coefficient}`, a coefficient of a polynomial \
+                 control, of which nodes have the value at the start of an interval alone. Take an integral \
+                 of the model, `integrals(..)`, with a terminal cost, or `WithIntegral`"
+            ),
             Self::DependsOnTime { function } => write!(
                 f,
                 "the end time is free, but `{function}` depends on the time and has no duration: name the parameter, \

@@ -39,6 +39,13 @@ pub enum OcpError {
         /// The names of the model.
         known: &'static Names,
     },
+    /// A phase that joined phases do not have.
+    NoSuchPhase {
+        /// The phase.
+        phase: usize,
+        /// The number of phases.
+        phases: usize,
+    },
     /// A stage that the horizon does not have.
     NoSuchStage {
         /// The part to be set.
@@ -252,6 +259,14 @@ pub enum OcpError {
         what: &'static str,
         /// The alternative.
         remedy: &'static str,
+    },
+    /// A running cost, which is evaluated at nodes, depends on a control that is a polynomial in
+    /// every interval.
+    CostAtNodes {
+        /// The function.
+        function: &'static str,
+        /// The coefficient of the control.
+        coefficient: &'static str,
     },
     /// The end time is free, and a function depends on the time of the integrator.
     DependsOnTime {

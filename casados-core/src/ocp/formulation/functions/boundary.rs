@@ -221,14 +221,35 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
             }
         });
     }
-    /// Adds nothing: derivatives by parameters are not supported with shared variables.
     fn add_parameter_derivatives(
         &mut self,
-        _: &S::ArrayV<T>,
-        _: Option<&[T]>,
-        _: &mut [T],
-        _: &mut ParameterDerivatives<'_, T>,
+        v: &S::ArrayV<T>,
+        mu: Option<&[T]>,
+        context: ConstraintContext<'_, T>,
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
     ) {
+        self.load_variables::<S>(v, context);
+        F::value_jacobian::<T>(&self.v, &mut self.g, &mut self.jacobian);
+        for ((row, variable), &value) in F::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
+            if let Some(p) = parameter_index::<F::Shape>(variable) {
+                crate::qp::element::set(slopes, row * S::NP + p, value);
+            }
+        }
+        let Some(mu) = mu else { return };
+        let mu: ArrayY<F, T> = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
+        for_each_hessian_entry::<F, T>(&self.v, &mu, &mut self.hessian, |row, column, value| {
+            // Parameters follow the states: they are rows of the lower triangle.
+            let Some(p) = parameter_index::<F::Shape>(row) else { return };
+            if let Some(position) = Self::position::<S>(column, context) {
+                cross.add_mixed(position, p, value);
+            } else if let Some(q) = parameter_index::<F::Shape>(column) {
+                cross.add_hessian(p, q, value);
+                if p != q {
+                    cross.add_hessian(q, p, value);
+                }
+            }
+        });
     }
     fn name(row: usize) -> (&'static str, usize) {
         (F::STRUCTURE.name, row)

@@ -135,6 +135,7 @@ pub trait Constraints<S: Shape, T: Real> {
         &mut self,
         v: &S::ArrayV<T>,
         mu: Option<&[T]>,
+        context: ConstraintContext<'_, T>,
         slopes: &mut [T],
         cross: &mut ParameterDerivatives<'_, T>,
     );
@@ -180,6 +181,7 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         &mut self,
         _: &S::ArrayV<T>,
         _: Option<&[T]>,
+        _: ConstraintContext<'_, T>,
         _: &mut [T],
         _: &mut ParameterDerivatives<'_, T>,
     ) {
@@ -257,13 +259,15 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         &mut self,
         v: &S::ArrayV<T>,
         mu: Option<&[T]>,
+        context: ConstraintContext<'_, T>,
         slopes: &mut [T],
         cross: &mut ParameterDerivatives<'_, T>,
     ) {
         let (first_slopes, second_slopes) = slopes.split_at_mut_checked(A::ROWS * S::NP).unwrap_or_default();
         let (first, second) = mu.and_then(|mu| mu.split_at_checked(A::ROWS)).unzip();
-        self.0.add_parameter_derivatives(v, first, first_slopes, cross);
-        self.1.add_parameter_derivatives(v, second, second_slopes, cross);
+        self.0.add_parameter_derivatives(v, first, context, first_slopes, cross);
+        let context = context.skip_copies(A::INITIAL_STATE_COPIES);
+        self.1.add_parameter_derivatives(v, second, context, second_slopes, cross);
     }
     fn name(row: usize) -> (&'static str, usize) {
         match row.checked_sub(A::ROWS) {
@@ -415,6 +419,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         &mut self,
         v: &ArrayV<F, T>,
         mu: Option<&[T]>,
+        _: ConstraintContext<'_, T>,
         slopes: &mut [T],
         cross: &mut ParameterDerivatives<'_, T>,
     ) {

@@ -82,9 +82,23 @@ pub struct AvailableVariables {
     pub(in crate::ocp) stage: usize,
     /// The time: available unless the end time is free.
     pub(in crate::ocp) t: bool,
+    /// The degrees of controls, if a function is evaluated at nodes in place of an interval, where
+    /// it may depend on constant controls only; otherwise empty.
+    pub(in crate::ocp) degrees: &'static [u32],
 }
 
 impl AvailableVariables {
+    /// Returns whether a control is a coefficient of a polynomial.
+    fn is_polynomial(self, control: usize) -> bool {
+        let mut end = 0;
+        let mut degrees = self.degrees.iter().map(|&degree| degree as usize);
+        degrees.any(|degree| {
+            let first = end;
+            end += degree + 1;
+            degree > 0 && (first..end).contains(&control)
+        })
+    }
+
     /// Checks that a function depends on available variables only.
     pub(in crate::ocp) fn check<F: Function>(self) -> Result<(), OcpError> {
         let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
@@ -101,6 +115,11 @@ impl AvailableVariables {
             } else {
                 None
             };
+            if let Some(&coefficient) = index.checked_sub(nz).and_then(|control| u.get(control))
+                && self.is_polynomial(index - nz)
+            {
+                return Err(OcpError::CostAtNodes { function, coefficient });
+            }
             if let Some(&variable) = missing {
                 return Err(OcpError::NotThere { function, variable, terminal: !self.u });
             }
@@ -277,13 +296,21 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             }
         }
     }
-    /// Adds the blocks `xp`, `up` and `pp`, column after column.
+    /// Adds the blocks `xp`, `up` and `pp`, column after column. Rows of `pp` of free parameters
+    /// are rows of variables, too.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up, pp]: [&[T]; 3]) {
         for (to, &value) in self.hessian.iter_mut().zip(pp) {
             *to = *to + value;
         }
-        for (first, rows, block) in [(0, nx, xp), (nx, nu, up)] {
+        if self.free.count() > 0 {
+            for (p, column) in pp.chunks_exact(self.gradient.len().max(1)).enumerate() {
+                for (w, value) in self.free.free_elements(column) {
+                    self.add_mixed(nx + w, p, value);
+                }
+            }
+        }
+        for (first, rows, block) in [(0, nx, xp), (nx + self.free.count(), nu, up)] {
             for (p, column) in block.chunks_exact(rows.max(1)).enumerate() {
                 column.iter().enumerate().for_each(|(i, &value)| self.add_mixed(first + i, p, value));
             }

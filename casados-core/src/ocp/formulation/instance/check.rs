@@ -61,8 +61,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::Unsupported { what, remedy });
         }
         let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
-        let before_end = AvailableVariables { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
-        let at_end = AvailableVariables { z: false, u: false, stage: intervals, t: false };
+        let before_end =
+            AvailableVariables { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false, degrees: &[] };
+        let at_end = AvailableVariables { z: false, u: false, stage: intervals, t: false, degrees: &[] };
         stage_cost.check(before_end)?;
         terminal_cost.check(at_end)?;
         path.check(before_end)?;

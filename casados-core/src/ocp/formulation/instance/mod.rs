@@ -21,6 +21,7 @@ use crate::ocp::formulation::instance::data::{
     Data, Layout, path_row_count, split_data, stage_variable_count,
 };
 use crate::ocp::formulation::instance::inner_points::InnerPoints;
+use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::set;
 use crate::qp::{Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, part_mut};
@@ -147,14 +148,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if intervals == 0 {
             return Err(OcpError::Missing { part: Part::Times, stage: 0 });
         }
-        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = problem.parts();
+        let degrees = if *running { <P::Dynamics as Dynamics<T>>::NAMES.degrees } else { &[] };
         let z = P::Dynamics::ALGEBRAIC;
         let (inside, at_end) = (
-            AvailableVariables { z, u: true, stage: 0, t: true },
-            AvailableVariables { z: false, u: false, stage: intervals, t: true },
+            AvailableVariables { z, u: true, stage: 0, t: true, degrees: &[] },
+            AvailableVariables { z: false, u: false, stage: intervals, t: true, degrees: &[] },
         );
         dynamics.check()?;
-        stage_cost.check(inside)?;
+        stage_cost.check(AvailableVariables { degrees, ..inside })?;
         terminal_cost.check(at_end)?;
         path.check(inside)?;
         terminal.check(at_end)?;
@@ -163,6 +165,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         horizon.write_times(times)?;
         // NaN marks parameters that are not set.
         p.fill(T::from_f64(f64::NAN));
+        write_interval_parameters(&<P::Dynamics as Dynamics<T>>::NAMES, times, p);
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
             let (begin, first_copy_row) = (k * path_row_count::<P, T>(layout), P::Path::ROWS);
@@ -242,7 +245,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
         Labels::states::<P, T>(Part::States, 0).check_vector(x, self.names().model_state_count())?;
-        Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, P::Shape::NU)?;
+        Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, self.names().model_control_count())?;
         let has_linear = !self.names().linear.is_empty();
         for k in 0..=self.intervals() {
             self.guess_stage(k, x, if k < self.intervals() || has_linear { u } else { &[] })?;
@@ -252,7 +255,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Sets the iterate to a state and a control at one stage, with zero multipliers. The last
     /// stage has no controls but the linear ones. Rates of linear controls become zero, integrals
-    /// are unchanged.
+    /// are unchanged, and polynomial controls are constant in the interval.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -264,18 +267,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
         let model_controls = stage_iterate.u.get_mut(free..).unwrap_or_default();
         let controls = if stage == last && !u.is_empty() && !model_names.linear.is_empty() {
-            P::Shape::NU
+            model_names.model_control_count()
+        } else if model_controls.is_empty() {
+            0
         } else {
-            model_controls.len()
+            model_names.model_control_count()
         };
         Labels::states::<P, T>(Part::States, stage).check_vector(x, model_names.model_state_count())?;
         Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, controls)?;
         copy_common(stage_iterate.x, x);
-        copy_common(model_controls, u);
-        for (state, &control) in (model_names.model_state_count()..).zip(model_names.linear) {
-            if let Some(&value) = u.get(control as usize) {
-                set(stage_iterate.x, state, value);
-                set(model_controls, control as usize, T::ZERO);
+        for (&value, (first, degree)) in u.iter().zip(model_names.model_controls()) {
+            let is_linear = |linear: &u32| *linear as usize == first;
+            if let Some(position) = model_names.linear.iter().position(is_linear) {
+                set(stage_iterate.x, model_names.model_state_count() + position, value);
+                set(model_controls, first, T::ZERO);
+            } else {
+                part_mut(model_controls, first, degree + 1).fill(value);
             }
         }
         for multipliers in [
@@ -326,6 +333,20 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Shifts the iterate by one interval, as the guess for the next sampling instant.
     pub fn shift(&mut self) {
         self.iterate.shift();
+    }
+}
+
+/// Writes start and length of every interval, the last parameters of models with polynomial
+/// controls; the last node has those of the last interval.
+fn write_interval_parameters<T: Real>(names: &Names, times: &[T], p: &mut [T]) {
+    if names.degrees.is_empty() {
+        return;
+    }
+    for (k, p) in p.chunks_exact_mut(names.p.len()).enumerate() {
+        let start = k.min(times.len().saturating_sub(2));
+        let [start, end] = [start, start + 1].map(|node| times.get(node).copied().unwrap_or(T::ZERO));
+        set(p, names.model_parameter_count(), start);
+        set(p, names.model_parameter_count() + 1, end - start);
     }
 }
 

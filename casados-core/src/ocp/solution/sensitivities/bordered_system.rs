@@ -1,5 +1,6 @@
-//! The bordered system: its unknowns are outside the recursion, namely a free first state, the
-//! multipliers `θ` of periodic states, and shared controls `w`.
+//! The bordered system: its unknowns are outside the recursion, namely free elements of the first
+//! state, the multipliers `θ` of periodic states, and shared controls `w`, which free parameters
+//! are.
 //!
 //! ```text
 //! π₀ + E θ = 0        x₀ − x_N = 0        Σ_k ∂L/∂u_k[j] = 0
@@ -14,17 +15,18 @@ use super::kkt_direction::KktDirection;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
-use crate::qp::{QpView, marked_indices, part, part_mut, zeros};
+use crate::qp::{QpView, copy_common, marked_indices, part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// The bordered system with the unknowns `(x₀, θ, w)`, each of which may be absent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BorderedSystem<T> {
     nx: usize,
     nu: usize,
-    /// The number of elements of a free first state; zero if it is given.
-    free_initial_states: usize,
+    /// The free elements of the first state.
+    free_initial_states: Range<usize>,
     pub(super) periodic_states: Vec<usize>,
     shared_controls: Vec<usize>,
     /// The rows of `M` of shared controls, for every interval.
@@ -42,10 +44,9 @@ impl<T: Real> BorderedSystem<T> {
     pub fn prepare(
         &mut self,
         qp: QpView<'_, T>,
-        is_free: bool,
+        free: Range<usize>,
         [nx, nu, n]: [usize; 3],
     ) -> Result<(), OcpError> {
-        let free = if is_free { nx } else { 0 };
         let is_unchanged = |old: &[usize], marks: &[T]| marked_indices(marks).eq(old.iter().copied());
         if free == self.free_initial_states
             && is_unchanged(&self.periodic_states, qp.periodic())
@@ -56,7 +57,7 @@ impl<T: Real> BorderedSystem<T> {
         (self.nx, self.nu, self.free_initial_states) = (nx, nu, free);
         self.periodic_states = marked_indices(qp.periodic()).collect();
         self.shared_controls = marked_indices(qp.shared()).collect();
-        self.shared_control_rows = zeros(n * self.shared_controls.len() * (nx + nu))?;
+        self.shared_control_rows = zeros((n + 1) * self.shared_controls.len() * (nx + nu))?;
         self.factors = zeros(self.unknown_count() * self.unknown_count())?;
         self.pivot_exchanges = zeros(self.unknown_count())?;
         Ok(())
@@ -64,14 +65,18 @@ impl<T: Real> BorderedSystem<T> {
 
     /// The number of unknowns.
     pub fn unknown_count(&self) -> usize {
-        self.free_initial_states + self.periodic_states.len() + self.shared_controls.len()
+        self.free_initial_states.len() + self.periodic_states.len() + self.shared_controls.len()
     }
     pub fn condition_count(&self) -> usize {
         self.periodic_states.len()
     }
-    /// Whether the first state is an unknown.
-    pub fn has_free_initial_state(&self) -> bool {
-        self.free_initial_states > 0
+    /// Whether an element of the first state is an unknown.
+    pub fn is_unknown(&self, state: usize) -> bool {
+        self.free_initial_states.contains(&state)
+    }
+    /// The number of given elements of the first state, in front of the free ones.
+    pub fn given_initial_states(&self, nx: usize) -> usize {
+        if self.free_initial_states.is_empty() { nx } else { self.free_initial_states.start }
     }
 
     /// Moves the rows of shared controls out of `M`, so that shared controls are not eliminated.
@@ -104,17 +109,19 @@ impl<T: Real> BorderedSystem<T> {
     }
     /// Shared controls with their indices among the unknowns.
     fn shared_control_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
-        let begin = self.free_initial_states + self.periodic_states.len();
+        let begin = self.free_initial_states.len() + self.periodic_states.len();
         self.shared_controls.iter().enumerate().map(move |(c, &j)| (begin + c, j))
     }
     /// Periodic states with the indices of their multipliers among the unknowns.
     fn periodic_multiplier_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.periodic_states.iter().enumerate().map(|(c, &i)| (self.free_initial_states + c, i))
+        self.periodic_states.iter().enumerate().map(|(c, &i)| (self.free_initial_states.len() + c, i))
     }
 
-    /// The first state: given, or an unknown.
-    pub fn initial_state<'a>(&self, start: &'a [T], unknowns: &'a [T]) -> &'a [T] {
-        if self.has_free_initial_state() { unknowns } else { start }
+    /// Writes the first state: its given elements, and the unknowns.
+    pub fn write_initial_state(&self, start: &[T], unknowns: &[T], x: &mut [T]) {
+        copy_common(x, start);
+        let free = x.get_mut(self.free_initial_states.clone()).unwrap_or_default();
+        copy_common(free, unknowns);
     }
 
     /// Adds the contribution of shared controls to a gradient, and moves the elements of shared
@@ -152,9 +159,9 @@ impl<T: Real> BorderedSystem<T> {
             let theta = get(&direction.border_unknowns, condition);
             add(direction.multipliers_mut(0), i, theta);
         }
-        for i in 0..self.free_initial_states {
+        for (condition, i) in self.free_initial_states.clone().enumerate() {
             let value = get(direction.multipliers(0), i);
-            set(&mut direction.border_residual, i, value);
+            set(&mut direction.border_residual, condition, value);
         }
     }
 }

@@ -20,10 +20,11 @@ pub(super) struct BoundStiffness<T> {
 }
 
 impl<T: Real> BoundStiffness<T> {
-    /// The stiffness for Hessians with this largest element.
-    pub fn new(largest: T, mu: T) -> Self {
+    /// The stiffness for Hessians with this largest element, with this compliance of active bounds
+    /// relative to it.
+    pub fn new(largest: T, mu: T, compliance: T) -> Self {
         let root = T::from_f64(T::EPSILON).sqrt();
-        let active = if largest > T::ZERO { largest / root } else { T::ONE / root };
+        let active = if largest > T::ZERO { largest / compliance } else { T::ONE / compliance };
         Self { active_stiffness: active, mu, tolerance: root.sqrt(), weakly_active: 0 }
     }
 
@@ -42,6 +43,12 @@ impl<T: Real> BoundStiffness<T> {
         let (below, above) = (value - at(bounds.lower), at(bounds.upper) - value);
         self.stiffness_of_side(below, lower, at(bounds.lower_linear), at(bounds.lower_quadratic))
             + self.stiffness_of_side(above, upper, at(bounds.upper_linear), at(bounds.upper_quadratic))
+    }
+
+    /// Whether this stiffness is that of an active constraint, whose value is constant.
+    pub fn is_active(&self, bounds: &Bounds<'_, T>, i: usize, stiffness: T) -> bool {
+        let is_equation = get(bounds.lower, i) == get(bounds.upper, i);
+        is_equation || self.mu == T::ZERO && stiffness >= self.active_stiffness
     }
 
     /// The stiffness of one bound, from its slack, multiplier and penalties.

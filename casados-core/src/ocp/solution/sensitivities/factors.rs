@@ -1,5 +1,6 @@
 //! Factors of the optimality conditions at a solution, for any number of derivatives.
 
+use super::active_constraints::ActiveConstraints;
 use super::bordered_system::BorderedSystem;
 use super::kkt_direction::KktDirection;
 use super::parameters::KktParameterDerivatives;
@@ -7,7 +8,7 @@ use super::stage_matrix;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{part, zeros};
+use crate::qp::{copy_common, part, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -27,8 +28,10 @@ use alloc::vec::Vec;
 /// number of parameters; the Hessian of the value costs one such solve for each parameter. The
 /// gradient of the value is that of the Lagrangian (envelope theorem), at no further cost.
 ///
-/// A free initial state, periodic states and shared controls are unknowns of a bordered system.
-/// There are no derivatives with respect to a free initial state.
+/// A free initial state, periodic states, shared controls, free parameters and end times are
+/// unknowns of a bordered system. There are no derivatives with respect to a free initial state,
+/// and those with respect to a free parameter are zero: its value is a result. In seeds of adjoints
+/// free parameters precede the controls of a stage.
 ///
 /// Derivatives are those for a constant active set. At a weakly active bound solutions have two
 /// one-sided derivatives; the bound counts as active if its multiplier is larger than its slack.
@@ -75,12 +78,16 @@ pub struct SolutionFactors<T> {
     /// barrier problem, which are continuous; bounds have the stiffness `μ/s²`. Zero, the default:
     /// derivatives of solutions of the problem itself, with active sets.
     pub smoothing: T,
-    /// `NX`, `NU`, `NP`
+    /// `NX`, free parameters and `NU`, `NP`
     pub(super) dims: [usize; 3],
+    /// The number of free parameters, in front of the controls.
+    pub(super) free: usize,
     pub(super) intervals: usize,
     /// `K` and the factors of `M_uu` of every interval.
     pub(super) gains: Vec<T>,
     pub(super) control_factors: Vec<T>,
+    /// The rows of `K` without free parameters, if there are some.
+    feedback: Vec<T>,
     /// `P` of every stage.
     pub(super) costs_to_go: Vec<T>,
     /// The rows of `[A B]` of every interval.
@@ -89,7 +96,7 @@ pub struct SolutionFactors<T> {
     pub(super) negative_pivots: usize,
     pub(super) bordered_system: BorderedSystem<T>,
     pub(super) parameter_derivatives: KktParameterDerivatives<T>,
-    pub(super) direction: KktDirection<T>,
+    pub(in crate::ocp) direction: KktDirection<T>,
     /// `∂V/∂x₀`, and the Hessian of the value.
     pub(super) gradient: Vec<T>,
     pub(super) hessian_x0: Vec<T>,
@@ -97,6 +104,7 @@ pub struct SolutionFactors<T> {
     pub(super) hessian_p: Vec<T>,
     pub(super) adjoint: Vec<T>,
     pub(super) weakly_active: usize,
+    pub(super) active: ActiveConstraints<T>,
     pub(super) work: Vec<T>,
 }
 
@@ -106,11 +114,27 @@ impl<T: Real> SolutionFactors<T> {
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let dims @ [nx, nu, np] = [P::Shape::NX, P::Shape::NU, P::Shape::NP];
-        let n = ocp.intervals();
+        let (free, n) = (ocp.free.count(), ocp.intervals());
+        let dims = [P::Shape::NX, free + P::Shape::NU, P::Shape::NP];
+        let derivatives = KktParameterDerivatives::new::<P>(free, n)?;
+        Self::with_dims(dims, free, n, derivatives)
+    }
+
+    /// Memory for stages of at most these dimensions.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub(in crate::ocp) fn with_dims(
+        dims: [usize; 3],
+        free: usize,
+        n: usize,
+        parameter_derivatives: KktParameterDerivatives<T>,
+    ) -> Result<Self, OcpError> {
+        let [nx, nu, np] = dims;
         Ok(Self {
             smoothing: T::ZERO,
             dims,
+            free,
             intervals: n,
             gains: zeros(n * nu * nx)?,
             control_factors: zeros(n * nu * nu)?,
@@ -118,7 +142,8 @@ impl<T: Real> SolutionFactors<T> {
             dynamics: zeros(n * nx * (nx + nu))?,
             negative_pivots: 0,
             bordered_system: BorderedSystem::default(),
-            parameter_derivatives: KktParameterDerivatives::new::<P>(n)?,
+            parameter_derivatives,
+            feedback: zeros(if free > 0 { n * (nu - free) * nx } else { 0 })?,
             direction: KktDirection::new(dims, n)?,
             gradient: zeros(nx)?,
             hessian_x0: zeros(nx * nx)?,
@@ -126,15 +151,27 @@ impl<T: Real> SolutionFactors<T> {
             hessian_p: zeros(np * np)?,
             adjoint: zeros(np)?,
             weakly_active: 0,
+            active: ActiveConstraints::default(),
             work: zeros(work_len(nx, nu))?,
         })
     }
 
     /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, by columns; empty for other stages.
+    /// Gains of controls at active bounds are zero up to `∛ε`.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.dims;
-        stage_matrix(&self.gains, stage, nu * nx)
+        let gains = if self.free > 0 { &self.feedback } else { &self.gains };
+        stage_matrix(gains, stage, (nu - self.free) * nx)
+    }
+
+    /// Writes the rows of `K` without free parameters.
+    pub(super) fn write_feedback(&mut self) {
+        let [_, nu, _] = self.dims;
+        let columns = self.gains.chunks_exact(nu.max(1));
+        for (to, from) in self.feedback.chunks_exact_mut((nu - self.free).max(1)).zip(columns) {
+            copy_common(to, from.get(self.free..).unwrap_or_default());
+        }
     }
 
     /// The number of bounds whose slack and multiplier are both below `ε^¼` (1e-4 in double
@@ -156,9 +193,25 @@ impl<T: Real> SolutionFactors<T> {
         &self.parameter_derivatives.value_gradient
     }
 
-    /// The number of given elements of the first state: all, or none.
+    /// The product of the forces of active constraints with their derivatives by a parameter.
+    pub(in crate::ocp) fn product_with_forces(
+        &self,
+        direction: &KktDirection<T>,
+        slope: impl Fn(usize, usize) -> T,
+    ) -> T {
+        self.active.product(&direction.constraint_multipliers, slope)
+    }
+    /// States, controls and parameters of a stage.
+    pub(in crate::ocp) fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+    pub(in crate::ocp) fn intervals(&self) -> usize {
+        self.intervals
+    }
+    /// The number of given elements of the first state: all, none, or all but linear controls and
+    /// what follows them.
     pub(super) fn given_initial_states(&self) -> usize {
-        if self.bordered_system.has_free_initial_state() { 0 } else { self.dims[0] }
+        self.bordered_system.given_initial_states(self.dims[0])
     }
     /// Columns of `P` of a stage.
     pub(super) fn cost_to_go(&self, k: usize) -> impl Iterator<Item = &[T]> {

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 /// A KKT direction: changes of states, controls and multipliers of the dynamics.
 #[derive(Clone, Debug, Default)]
-pub(super) struct KktDirection<T> {
+pub(in crate::ocp) struct KktDirection<T> {
     nx: usize,
     nu: usize,
     pub(super) x: Vec<T>,
@@ -20,6 +20,8 @@ pub(super) struct KktDirection<T> {
     /// The unknowns of the bordered system, and the residuals of its conditions.
     pub border_unknowns: Vec<T>,
     pub border_residual: Vec<T>,
+    /// The forces of active constraints.
+    pub constraint_multipliers: Vec<T>,
 }
 
 impl<T: Real> KktDirection<T> {
@@ -28,12 +30,13 @@ impl<T: Real> KktDirection<T> {
             nx,
             nu,
             x: zeros((n + 1) * nx)?,
-            u: zeros(n * nu)?,
+            u: zeros((n + 1) * nu)?,
             pi: zeros((n + 1) * nx)?,
             initial_state: zeros(nx)?,
             work: zeros(2 * nx + nu)?,
             border_unknowns: Vec::new(),
             border_residual: Vec::new(),
+            constraint_multipliers: Vec::new(),
         })
     }
     pub fn state(&self, k: usize) -> &[T] {
@@ -61,11 +64,13 @@ impl<T: Real> KktDirection<T> {
 
 /// The right-hand side of the KKT system: a gradient `q_k` over `(x, u)`, and constants `e_k` of
 /// the dynamics.
-pub(super) trait RightHandSide<T> {
+pub(in crate::ocp) trait RightHandSide<T> {
     /// Writes `q_k`, which is zero before.
     fn gradient(&self, k: usize, q: &mut [T]);
     /// `e_k`; empty if it is zero.
     fn dynamics_constant(&self, k: usize) -> &[T];
+    /// The constant `s` of a constraint row of a stage.
+    fn constraint_slope(&self, _stage: usize, _row: usize) -> T;
 }
 
 /// `x = −M_uu⁻¹ b`

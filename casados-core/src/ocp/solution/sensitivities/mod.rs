@@ -5,19 +5,21 @@
 //! | `factors`, `derivatives` | factors of the KKT system: adjoints, derivatives of the value |
 //! | `recursion`, `bound_stiffness` | the Riccati recursion, and the stiffness of bounds |
 //! | `solve`, `kkt_direction`, `bordered_system` | solves by the factors, coupling of stages |
+//! | `active_constraints` | active constraints, and the removal of their compliance |
 //! | `parameters`, `references` | derivatives of the optimality conditions with respect to these |
 //! | `covariance` | the covariance of an estimate, and unidentifiable directions |
 //! | `unknowns`, `gram` | the unknowns of an estimate, and its reduced Hessian |
 
+pub(in crate::ocp) mod active_constraints;
 mod bordered_system;
 mod bound_stiffness;
 mod covariance;
 mod derivatives;
 mod factors;
 mod gram;
-mod kkt_direction;
-mod parameters;
-mod recursion;
+pub(in crate::ocp) mod kkt_direction;
+pub(in crate::ocp) mod parameters;
+pub(in crate::ocp) mod recursion;
 pub(in crate::ocp) mod references;
 mod results;
 mod solve;
@@ -34,7 +36,7 @@ use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::qp::{StageDims, copy_common, part_mut, zeros};
+use crate::qp::{StageDims, copy_common, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -75,6 +77,9 @@ pub struct Sensitivities<T> {
     /// `dx/dp` and `du/dp`.
     x_p: Vec<T>,
     u_p: Vec<T>,
+    /// `dw/dx₀` and `dw/dp` of the free parameters.
+    w: Vec<T>,
+    w_p: Vec<T>,
 }
 
 impl<T: Real> Sensitivities<T> {
@@ -86,13 +91,16 @@ impl<T: Real> Sensitivities<T> {
         ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
     ) -> Result<Self, OcpError> {
         let factors = SolutionFactors::new(ocp)?;
-        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
+        let ([nx, nu, np], n, free) = (factors.dims, factors.intervals, factors.free);
+        let nu = nu - free;
         Ok(Self {
             factors,
             x: zeros((n + 1) * nx * nx)?,
             u: zeros(n * nu * nx)?,
             x_p: zeros((n + 1) * nx * np)?,
             u_p: zeros(n * nu * np)?,
+            w: zeros(free * nx)?,
+            w_p: zeros(free * np)?,
         })
     }
 
@@ -116,7 +124,7 @@ impl<T: Real> Sensitivities<T> {
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.factors.dims;
-        stage_matrix(&self.u, stage, nu * nx)
+        stage_matrix(&self.u, stage, (nu - self.factors.free) * nx)
     }
     /// `dx_k/dp`, `NX × NP`, by columns.
     #[must_use]
@@ -128,20 +136,34 @@ impl<T: Real> Sensitivities<T> {
     #[must_use]
     pub fn du_dp(&self, stage: usize) -> &[T] {
         let [_, nu, np] = self.factors.dims;
-        stage_matrix(&self.u_p, stage, nu * np)
+        stage_matrix(&self.u_p, stage, (nu - self.factors.free) * np)
+    }
+    /// `dw/dx₀` of the [free parameters](crate::ocp::HeapOcp::free), in the order of the calls of
+    /// `free`, after the elements of the first state that boundary conditions depend on; by
+    /// columns.
+    #[must_use]
+    pub fn dw(&self) -> &[T] {
+        &self.w
+    }
+    /// `dw/dp` of the free parameters, by columns; zero by free parameters.
+    #[must_use]
+    pub fn dw_dp(&self) -> &[T] {
+        &self.w_p
     }
 
     fn differentiate_by_initial_state(&mut self) {
-        let Self { factors, x, u, .. } = self;
-        let ([nx, nu, _], n) = (factors.dims, factors.intervals);
+        let Self { factors, x, u, w, .. } = self;
+        let ([nx, nu, _], n, free) = (factors.dims, factors.intervals, factors.free);
+        let nu = nu - free;
         let mut direction = core::mem::take(&mut factors.direction);
         x.fill(T::ZERO);
         u.fill(T::ZERO);
         for i in 0..factors.given_initial_states() {
             solve::solve_initial_state(factors, i, &mut direction);
+            copy_common(part_mut(w, i * free, free), direction.control(0));
             for k in 0..=n {
                 copy_common(part_mut(x, (k * nx + i) * nx, nx), direction.state(k));
-                copy_common(part_mut(u, (k * nx + i) * nu, nu), direction.control(k));
+                copy_common(part_mut(u, (k * nx + i) * nu, nu), part(direction.control(k), free, nu));
             }
         }
         factors.direction = direction;
@@ -150,7 +172,8 @@ impl<T: Real> Sensitivities<T> {
     /// A derivative that is not finite: its stage, its row in `(x, u)`, its column in `(x₀, p)`,
     /// and its value.
     fn find_non_finite(&self) -> Option<(usize, usize, usize, f64)> {
-        let [nx, nu, np] = self.factors.dims;
+        let ([nx, nu, np], free) = (self.factors.dims, self.factors.free);
+        let nu = nu - free;
         let by_initial_state = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
         let by_parameters = [(&self.x_p, [0, nx], [nx, np]), (&self.u_p, [nx, nu], [nx, np])];
         by_initial_state.into_iter().chain(by_parameters).find_map(
@@ -163,14 +186,16 @@ impl<T: Real> Sensitivities<T> {
     }
 
     fn differentiate_by_parameters(&mut self) {
-        let Self { factors, x_p, u_p, .. } = self;
-        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
+        let Self { factors, x_p, u_p, w_p, .. } = self;
+        let ([nx, nu, np], n, free) = (factors.dims, factors.intervals, factors.free);
+        let nu = nu - free;
         let mut direction = core::mem::take(&mut factors.direction);
         for p in 0..np {
             solve::solve_parameter(factors, p, &mut direction);
+            copy_common(part_mut(w_p, p * free, free), direction.control(0));
             for k in 0..=n {
                 copy_common(part_mut(x_p, (k * np + p) * nx, nx), direction.state(k));
-                copy_common(part_mut(u_p, (k * np + p) * nu, nu), direction.control(k));
+                copy_common(part_mut(u_p, (k * np + p) * nu, nu), part(direction.control(k), free, nu));
             }
         }
         factors.direction = direction;
@@ -223,15 +248,20 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory
-    /// is that of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian
+    /// is that of another problem; [`OcpError::FreeParameters`], [`OcpError::Coupled`];
+    /// [`OcpError::Qp`] if the reduced Hessian
     /// is not positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
+        if self.free.count() > 0 {
+            return Err(OcpError::FreeParameters);
+        }
         self.check_uncoupled()?;
         if self.initial_state == InitialState::Free {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         self.prepare_factors(&mut result.factors)?;
-        result.factors.factorise_qp(self.qp.view(), &self.iterate, false)?;
+        let compliance = T::from_f64(T::EPSILON).sqrt();
+        result.factors.factorise_qp(self.qp.view(), &self.iterate, compliance, &mut |_, _, _| {})?;
         let Sensitivities { x, u, x_p, u_p, .. } = result;
         for derivatives in [x, u, x_p, u_p] {
             derivatives.fill(T::ZERO);

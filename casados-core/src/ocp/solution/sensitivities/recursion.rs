@@ -1,14 +1,13 @@
 //! The Riccati recursion for derivatives of solutions.
 
+use super::active_constraints::ActiveConstraints;
 use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
 use super::kkt_direction::solve_controls;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
-use crate::qp::{
-    QpError, QpView, Solution, SolutionStage, Stage, StageDims, copy_common, marked_indices, part, part_mut,
-};
+use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, marked_indices, part, part_mut};
 use crate::scalar::Real;
 
 /// Computes `∂V/∂x₀`: the derivative of the Lagrangian with respect to the first state, without the
@@ -47,8 +46,10 @@ fn lagrangian_derivative<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_
         .fold(cost_derivative, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
 }
 
-/// Computes `P_k`, `K_k` and the factors of `M_uu` backward. If `with_parameters`, adds active
-/// constraints to the derivatives with respect to parameters.
+/// Receives stage and row of an active constraint, its stiffness and its gradient.
+pub(in crate::ocp) type ActiveConstraintSink<'a, T> = &'a mut dyn FnMut([usize; 2], T, &[T]);
+
+/// Computes `P_k`, `K_k` and the factors of `M_uu` backward.
 ///
 /// # Errors
 /// [`QpError::NotConvex`]
@@ -57,27 +58,34 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
     stiffness: &mut BoundStiffness<T>,
-    with_parameters: bool,
+    on_active: ActiveConstraintSink<'_, T>,
 ) -> Result<(), OcpError> {
     let [nx, nu, _] = factors.dims;
     let (size, n) = (nx + nu, factors.intervals);
     let mut memory = core::mem::take(&mut factors.work);
     factors.negative_pivots = 0;
+    let mut active = core::mem::take(&mut factors.active);
+    active.clear();
     let (product, rest) = memory.split_at_mut_checked(nx * size).unwrap_or_default();
     let m = part_mut(rest, 0, size * size);
     let mut result = Ok(());
     for (k, (stage, point)) in qp.stages().zip(iterate.stages()).enumerate().rev() {
-        write_stage_hessian(factors, m, [k, size], (&stage, &point), stiffness, with_parameters);
+        write_stage_hessian(factors, m, [k, size], (&stage, &point), (stiffness, &mut active), on_active);
         if k < n {
             let view = stage.arrays();
-            for l in 0..nx {
-                let row = part_mut(&mut factors.dynamics, (k * nx + l) * size, size);
-                copy_common(row, part(view.matrix, l * view.ld, size));
+            let rows = part_mut(&mut factors.dynamics, k * nx * size, nx * size);
+            rows.fill(T::ZERO);
+            for (l, row) in rows.chunks_exact_mut(size.max(1)).enumerate().take(view.next) {
+                for (j, &value) in part(view.matrix, l * view.ld, view.n).iter().enumerate() {
+                    set(row, padded_index(j, point.x.len(), nx), value);
+                }
             }
             let next = part(&factors.costs_to_go, (k + 1) * nx * nx, nx * nx);
             let dynamics = part(&factors.dynamics, k * nx * size, nx * size);
             add_cost_to_go(m, product, next, dynamics, [nx, size]);
-            factors.bordered_system.extract_shared_control_rows(k, m);
+        }
+        factors.bordered_system.extract_shared_control_rows(k, m);
+        if k < n {
             let controls = part_mut(&mut factors.control_factors, k * nu * nu, nu * nu);
             let max_negative = factors.bordered_system.condition_count() - factors.negative_pivots;
             match factorise_controls(m, size, [nx, nu], controls, max_negative) {
@@ -104,36 +112,53 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
     }
-    factors.work = memory;
+    (factors.work, factors.active) = (memory, active);
     result
 }
 
 /// Writes `M = H` plus the stiffness of bounds: the lower triangle, by columns.
 fn write_stage_hessian<T: Real>(
-    factors: &mut SolutionFactors<T>,
+    factors: &SolutionFactors<T>,
     m: &mut [T],
     [k, size]: [usize; 2],
     (stage, point): (&Stage<'_, T>, &SolutionStage<'_, T>),
-    stiffness: &mut BoundStiffness<T>,
-    with_parameters: bool,
+    (stiffness, active): (&mut BoundStiffness<T>, &mut ActiveConstraints<T>),
+    on_active: ActiveConstraintSink<'_, T>,
 ) {
     let view = stage.arrays();
-    let (variables, ld) = (view.n, view.ld);
+    let (variables, ld, [nx, nu, _]) = (view.n, view.ld, factors.dims);
+    let place = |i: usize| padded_index(i, point.x.len(), nx);
+    let at = |i: usize, j: usize| place(j) * size + place(i);
+    m.fill(T::ZERO);
     for j in 0..variables {
         for i in j..variables {
-            set(m, j * size + i, get(view.hessian, j * ld + i));
+            set(m, at(i, j), get(view.hessian, j * ld + i));
         }
     }
+    if k < factors.intervals {
+        // Controls that this stage does not have are zero.
+        (nx + point.u.len()..nx + nu).for_each(|i| set(m, i * size + i, T::ONE));
+    }
     // A given state is fixed by its equation.
-    let states = if k == 0 && !factors.bordered_system.has_free_initial_state() { &[] } else { point.x };
-    for (i, &x) in states.iter().enumerate() {
+    let is_unknown = |i: usize| k > 0 || factors.bordered_system.is_unknown(i);
+    for (i, &x) in point.x.iter().enumerate().filter(|(i, _)| is_unknown(*i)) {
         let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
-        add(m, i * size + i, stiffness.stiffness_of_bound(&stage.x_bounds(), i, x, multipliers));
+        let bounds = stage.x_bounds();
+        let spring = stiffness.stiffness_of_bound(&bounds, i, x, multipliers);
+        add(m, i * size + i, spring);
+        if stiffness.is_active(&bounds, i, spring) {
+            active.add_variable(k, i, spring);
+        }
     }
     for (i, &u) in point.u.iter().enumerate() {
         let multipliers = [get(point.u_lower, i), get(point.u_upper, i)];
-        let place = (point.x.len() + i) * (size + 1);
-        add(m, place, stiffness.stiffness_of_bound(&stage.u_bounds(), i, u, multipliers));
+        let place = (nx + i) * (size + 1);
+        let bounds = stage.u_bounds();
+        let spring = stiffness.stiffness_of_bound(&bounds, i, u, multipliers);
+        add(m, place, spring);
+        if stiffness.is_active(&bounds, i, spring) {
+            active.add_variable(k, nx + i, spring);
+        }
     }
     for (row, (&lower, &upper)) in point.g_lower.iter().zip(point.g_upper).enumerate() {
         let c = part(view.matrix, (view.next + row) * ld, variables);
@@ -145,13 +170,20 @@ fn write_stage_hessian<T: Real>(
         }
         for (j, &factor) in c.iter().enumerate() {
             for i in j..variables {
-                add(m, j * size + i, row_stiffness * get(c, i) * factor);
+                add(m, at(i, j), row_stiffness * get(c, i) * factor);
             }
         }
-        if with_parameters {
-            factors.parameter_derivatives.add_constraint([k, row], row_stiffness, c);
+        on_active([k, row], row_stiffness, c);
+        if stiffness.is_active(&stage.g_bounds(), row, row_stiffness) {
+            let elements = c.iter().enumerate().map(|(i, &value)| (place(i), value));
+            active.add_row([k, row], row_stiffness, size, elements);
         }
     }
+}
+
+/// The index of a variable of a stage with `states` states among `(x, u)` with `nx` states.
+pub(in crate::ocp) const fn padded_index(variable: usize, states: usize, nx: usize) -> usize {
+    if variable < states { variable } else { nx + variable - states }
 }
 
 /// Adds `[A B]ᵀ P [A B]`: `P` is symmetric, and `[A B]` is stored by rows.

@@ -8,7 +8,7 @@ use crate::ocp::formulation::functions::node_evaluation::write_variables;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{Node, split_data};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{StageDims, take_mut};
+use crate::qp::{StageDims, part_mut, take_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -96,12 +96,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             node.write_variables::<P::Shape>(&mut point, &stage_point, z, free);
             let mut direction = <P::Shape as Shape>::ArrayV::<T>::zeroed();
             if let DifferentiatedQuantity::Adjoint(factors) = quantity {
-                let (x, u) = (factors.direction.state(k), factors.direction.control(k));
+                let (x, variables) = (factors.direction.state(k), factors.direction.control(k));
+                let (w, u) = variables.split_at_checked(free.count()).unwrap_or_default();
                 write_variables::<P::Shape, T>(&mut direction, [x, &[], u, &[]], T::ZERO);
-                let n = P::Shape::NX + P::Shape::NU;
+                let of_p = 2 * P::Shape::NX + P::Shape::NZ + P::Shape::NU;
+                free.scatter_step(part_mut(direction.as_mut(), of_p, P::Shape::NP), w);
+                let n = x.len() + variables.len();
                 let of_z = direction.as_mut().get_mut(2 * P::Shape::NX..).unwrap_or_default();
                 for (of_z, row) in of_z.iter_mut().zip(dz.chunks_exact(n.max(1))) {
-                    let products = row.iter().zip(x.iter().chain(u)).map(|(&a, &b)| a * b);
+                    let products = row.iter().zip(x.iter().chain(variables)).map(|(&a, &b)| a * b);
                     *of_z = products.fold(T::ZERO, |sum, product| sum + product);
                 }
             }

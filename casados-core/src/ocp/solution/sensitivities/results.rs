@@ -37,7 +37,8 @@ pub struct SolutionAdjoint<'a, T> {
 }
 
 /// The Hessian of the optimal value; matrices by columns. With a free initial state only `∂²V/∂p²`
-/// is not empty.
+/// is not empty; with linear controls, which are free at the start, `x₀` are the states of the
+/// model.
 ///
 /// ```
 /// # use casados::ocp::*;

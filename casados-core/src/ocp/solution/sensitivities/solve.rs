@@ -1,5 +1,6 @@
 //! Solves of the KKT system by the factors of the recursion and the bordered system.
 
+use super::active_constraints::WithForces;
 use super::bordered_system::BorderedSystem;
 use super::factors::SolutionFactors;
 use super::kkt_direction::{KktDirection, RightHandSide, solve_controls};
@@ -10,9 +11,28 @@ use crate::qp::{QpError, Solution, StageDims, Symmetric, copy_common, part, part
 use crate::scalar::Real;
 
 impl<T: Real> BorderedSystem<T> {
+    /// Solves for a right-hand side, and once more with the forces of active constraints.
+    pub fn solve<R: RightHandSide<T>>(
+        &self,
+        factors: &SolutionFactors<T>,
+        right_hand_side: &R,
+        direction: &mut KktDirection<T>,
+    ) {
+        self.solve_with_springs(factors, right_hand_side, direction);
+        let active = &factors.active;
+        active.write_multipliers(right_hand_side, direction);
+        if active.is_empty() {
+            return;
+        }
+        let multipliers = core::mem::take(&mut direction.constraint_multipliers);
+        let forces = WithForces { right_hand_side, active, multipliers: &multipliers };
+        self.solve_with_springs(factors, &forces, direction);
+        direction.constraint_multipliers = multipliers;
+    }
+
     /// Solves for a right-hand side: a sweep with all unknowns zero gives the residuals of the
     /// bordered system, whose solution is used in a second sweep.
-    pub fn solve<R: RightHandSide<T>>(
+    fn solve_with_springs<R: RightHandSide<T>>(
         &self,
         factors: &SolutionFactors<T>,
         right_hand_side: &R,
@@ -64,10 +84,13 @@ impl<T: Real> BorderedSystem<T> {
 /// The zero right-hand side.
 pub(super) struct ZeroRightHandSide;
 
-impl<T> RightHandSide<T> for ZeroRightHandSide {
+impl<T: Real> RightHandSide<T> for ZeroRightHandSide {
     fn gradient(&self, _: usize, _: &mut [T]) {}
     fn dynamics_constant(&self, _: usize) -> &[T] {
         &[]
+    }
+    fn constraint_slope(&self, _: usize, _: usize) -> T {
+        T::ZERO
     }
 }
 
@@ -83,6 +106,9 @@ impl<T: Real> RightHandSide<T> for ParameterRightHandSide<'_, T> {
         let [nx, _, _] = self.0.dims;
         part(self.0.parameter_derivatives.end_jacobian(k), self.1 * nx, nx)
     }
+    fn constraint_slope(&self, stage: usize, row: usize) -> T {
+        self.0.parameter_derivatives.constraint_slope(stage, row, self.1)
+    }
 }
 
 /// A right-hand side with a gradient over states and controls.
@@ -97,6 +123,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> RightHandSide<T
     }
     fn dynamics_constant(&self, _: usize) -> &[T] {
         &[]
+    }
+    fn constraint_slope(&self, _: usize, _: usize) -> T {
+        T::ZERO
     }
 }
 
@@ -118,6 +147,15 @@ pub(super) fn solve_parameter<T: Real>(
     direction: &mut KktDirection<T>,
 ) {
     factors.bordered_system.solve(factors, &ParameterRightHandSide(factors, p), direction);
+}
+
+impl<T: Real> SolutionFactors<T> {
+    /// Solves for a right-hand side, in the direction of the factors.
+    pub(in crate::ocp) fn solve<R: RightHandSide<T>>(&mut self, right_hand_side: &R) {
+        let mut direction = core::mem::take(&mut self.direction);
+        self.bordered_system.solve(self, right_hand_side, &mut direction);
+        self.direction = direction;
+    }
 }
 
 /// Solves for a gradient over states and controls.
@@ -168,8 +206,9 @@ fn backward_sweep<T: Real, R: RightHandSide<T>>(
             let controls = part(&factors.control_factors, k * nu * nu, nu * nu);
             solve_controls(controls, part(q, nx, nu), part_mut(u, k * nu, nu));
         } else {
-            right_hand_side.gradient(k, part_mut(q, 0, nx));
+            right_hand_side.gradient(k, q);
             factors.bordered_system.add_periodic_multipliers(unknowns, q);
+            factors.bordered_system.add_shared_control_gradient(k, unknowns, q, residual);
         }
         for (j, s) in part_mut(pi, k * nx, nx).iter_mut().enumerate() {
             let of_controls = if k < n { dot(factors.gain_column(k, j), part(q, nx, nu)) } else { T::ZERO };
@@ -193,16 +232,18 @@ fn forward_sweep<T: Real, R: RightHandSide<T>>(
         border_residual: residual,
         ..
     } = direction;
-    copy_common(part_mut(x, 0, nx), factors.bordered_system.initial_state(start, unknowns));
+    factors.bordered_system.write_initial_state(start, unknowns, part_mut(x, 0, nx));
     for k in 0..=factors.intervals {
         let (before, after) = x.split_at_mut_checked((k + 1) * nx).unwrap_or_default();
         let state = part(before, k * nx, nx);
         let multipliers = part_mut(pi, k * nx, nx);
         factors.cost_to_go(k).zip(state).for_each(|(column, &x)| axpy(x, column, multipliers));
+        let control = part_mut(u, k * nu, nu);
         if k == factors.intervals {
+            control.fill(T::ZERO);
+            factors.bordered_system.set_shared_controls(k, state, control, unknowns, residual);
             break;
         }
-        let control = part_mut(u, k * nu, nu);
         for (j, &x) in state.iter().enumerate() {
             axpy(x, factors.gain_column(k, j), control);
         }

@@ -1,6 +1,7 @@
 //! The iterate with points between the nodes.
 
 use super::{Kind, Series, Trajectory};
+use crate::ocp::formulation::bernstein;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
@@ -82,7 +83,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let indices: Vec<Option<usize>> = series.iter().map(&mut place).collect();
         let pairs = series.iter().zip(indices);
-        let series = pairs.map(|(series, index)| inside.dense_series(series, index)).collect();
+        let mut dense_series: Vec<Series<T>> =
+            pairs.map(|(series, index)| inside.dense_series(series, index)).collect();
+        for (first, degree) in model_names.model_controls().filter(|&(_, degree)| degree > 0) {
+            let is_first = |one: &Series<T>| Some(&one.name.as_str()) == model_names.u.get(first);
+            let Some(at) = series.iter().position(is_first) else { continue };
+            let coefficients = series.get(at..=at + degree).unwrap_or_default();
+            // The control precedes its coefficients.
+            if let Some(control) = at.checked_sub(1).and_then(|before| dense_series.get_mut(before)) {
+                let theta = |point: usize| point.checked_sub(1).map_or(T::ZERO, |j| get(&parts, j));
+                for (index, value) in control.values.iter_mut().enumerate() {
+                    let (k, point) = (index / (points + 1), index % (points + 1));
+                    let of_interval: Vec<T> = coefficients.iter().map(|one| get(&one.values, k)).collect();
+                    *value = bernstein::value(&of_interval, theta(point));
+                }
+            }
+        }
+        let series = dense_series;
         Ok(Trajectory { model, times: dense, time_unit, series })
     }
 

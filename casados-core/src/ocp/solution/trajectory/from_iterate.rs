@@ -32,6 +32,15 @@ fn unit_at(units: &'static [&'static str], index: usize) -> &'static str {
 }
 
 impl Names {
+    /// The kind of a control of the QP.
+    pub(super) fn control_kind(&self, control: usize) -> Kind {
+        match self.linear_state(control) {
+            Some(_) => Kind::Rate,
+            None if self.polynomial_of(control).is_some() => Kind::Coefficient,
+            None => Kind::Control,
+        }
+    }
+
     /// The kind of a state of the QP.
     pub(super) fn state_kind(&self, state: usize) -> Kind {
         match state.checked_sub(self.model_state_count()) {
@@ -97,19 +106,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let free = self.free.count();
         for (i, &name) in model_names.u.iter().enumerate() {
-            let (kind, linear) = match model_names.linear_state(i) {
-                Some(state) => (Kind::Rate, Some(self.state_series(state, &states))),
-                None => (Kind::Control, None),
-            };
-            series.extend(linear);
+            let kind = model_names.control_kind(i);
+            if let Some(state) = model_names.linear_state(i) {
+                series.push(self.state_series(state, &states));
+            }
             let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, free + i)).collect();
             let control = Series::new(kind, name, 0, values).with_unit(unit_at(model_names.units.u, i));
-            series.push(self.with_bounds_and_multipliers(control, free + i, &controls));
+            let control = self.with_bounds_and_multipliers(control, free + i, &controls);
+            if model_names.polynomial_of(i).is_some_and(|(first, _)| first == i) {
+                let name = model_names.control_name(i);
+                series.push(Series { kind: Kind::Control, name: name.into(), ..control.clone() });
+            }
+            series.push(control);
         }
         for i in model_names.x.len() - model_names.integrals..model_names.x.len() {
             series.push(self.state_series(i, &states));
         }
-        for (i, &name) in model_names.p.iter().enumerate() {
+        for (i, &name) in model_names.p.iter().take(model_names.model_parameter_count()).enumerate() {
             let parameter = match self.free.view().index_of(i) {
                 Some(w) => self.free_parameter_series(name, w, &controls),
                 None => {

@@ -259,6 +259,15 @@ impl<T: Real> Trajectory<T> {
         Ok(&self.series_of_kind(name, Kind::Control)?.values)
     }
 
+    /// A Bernstein coefficient of a polynomial control in every interval: `u[0]`, the value at the
+    /// start, to `u[d]`, the value at the end.
+    ///
+    /// # Errors
+    /// The errors of [`Trajectory::get`].
+    pub fn coefficient(&self, name: &str) -> Result<&[T], TrajectoryError> {
+        Ok(&self.series_of_kind(name, Kind::Coefficient)?.values)
+    }
+
     /// The rate of a linear control in every interval: `du` of `u`.
     ///
     /// # Errors

@@ -2,12 +2,13 @@
 
 use super::from_iterate::constraint_names;
 use super::{Kind, Series, Trajectory, TrajectoryError};
+use crate::ocp::formulation::bernstein;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::node_row_count;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::{get, set};
-use crate::qp::{SolutionStageMut, StageDims};
+use crate::qp::{SolutionStageMut, StageDims, copy_common};
 use crate::scalar::Real;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -51,7 +52,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             for (index, name) in names.into_iter().enumerate() {
                 let series_kind = match kind {
                     Kind::State => model_names.state_kind(index),
-                    Kind::Control if model_names.linear_state(index).is_some() => Kind::Rate,
+                    Kind::Control => model_names.control_kind(index),
                     kind => kind,
                 };
                 // Repeated functions have the same names, in the same order.
@@ -149,7 +150,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let model_states = model_names.x.get(..model_names.model_state_count()).unwrap_or_default();
         let controls: Vec<&str> =
-            (0..model_names.u.len()).map(|control| model_names.control_name(control)).collect();
+            model_names.model_controls().map(|(first, _)| model_names.control_name(first)).collect();
         let (states, controls) =
             (all_series(model_states, Kind::State)?, all_series(&controls, Kind::Control)?);
         let (mut x, mut u) = (Vec::new(), Vec::new());
@@ -175,6 +176,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 u.extend(controls.iter().map(at));
             }
             self.guess_stage(k, &x, &u)?;
+            self.guess_polynomials(k, unit, trajectory, before);
         }
         for (parameter, &name) in model_names.p.iter().enumerate() {
             if let Some(w) = self.free.view().index_of(parameter)
@@ -185,6 +187,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         self.check_iterate()?;
         Ok(self)
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Sets the polynomial controls of an interval to the parts of those of a trajectory in its
+    /// interval `from`, if the trajectory has coefficients.
+    fn guess_polynomials(&mut self, k: usize, unit: T, trajectory: &Trajectory<T>, from: usize) {
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
+        let from = from.min(trajectory.times.len().saturating_sub(2));
+        let [start, end] = [from, from + 1].map(|node| element_or_last(&trajectory.times, node));
+        let nodes = [k, k + 1].map(|node| unit * element_or_last(self.times(), node));
+        let ends = nodes.map(|time| ((time - start) / (end - start)).max(T::ZERO).min(T::ONE));
+        let free = self.free.count();
+        for (first, degree) in model_names.model_controls().filter(|&(_, degree)| degree > 0) {
+            let names = model_names.u.get(first..=first + degree).unwrap_or_default();
+            let series: Result<Vec<_>, _> =
+                names.iter().map(|name| trajectory.series_of_kind(name, Kind::Coefficient)).collect();
+            let (Ok(series), Some(stage)) = (series, self.iterate.stage_mut(k)) else { continue };
+            let coefficients: Vec<T> = series.iter().map(|one| element_or_last(&one.values, from)).collect();
+            let part = bernstein::restriction(&coefficients, ends);
+            copy_common(stage.u.get_mut(free + first..).unwrap_or_default(), &part);
+        }
     }
 }
 

@@ -33,7 +33,8 @@ pub enum Kind {
     State,
     /// An algebraic state, at the start of every interval.
     Algebraic,
-    /// A control, constant in every interval; or a linear control, at every node.
+    /// A control, constant in every interval; a linear control, at every node; a polynomial
+    /// control, at the start of every interval.
     Control,
     /// A parameter, at every node.
     Parameter,
@@ -48,6 +49,9 @@ pub enum Kind {
     Rate,
     /// An integral from the start to every node.
     Integral,
+    /// A Bernstein coefficient of a polynomial control, in every interval: `u[0]` is its value at
+    /// the start, and the last coefficient its value at the end.
+    Coefficient,
 }
 
 /// One quantity over time. Lists of missing data are empty.
