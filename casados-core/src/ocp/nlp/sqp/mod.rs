@@ -6,6 +6,7 @@
 //!
 //! | | |
 //! | --- | --- |
+//! | `bound_multipliers` | multipliers of active bounds, where distances are rounded |
 //! | `multipliers` | least-squares multipliers, where costs have no curvature |
 //! | `direction` | the QP: inertia correction, elastic mode |
 //! | `line_search` | the step length, by the `merit_function` or a filter (`acceptance`) |
@@ -14,6 +15,7 @@
 //! | `restart` | the second attempt, from a simulation |
 
 mod acceptance;
+mod bound_multipliers;
 mod direction;
 mod line_search;
 mod merit_function;

@@ -326,6 +326,9 @@ where
         if state.is_run_start && C::EXACT {
             self.least_squares_multipliers(ocp, state)?;
         }
+        if state.scaling.is_some() && log_row.iteration > 0 {
+            self.update_bound_multipliers(ocp, state);
+        }
         let (residuals, objective) = ocp.residuals();
         (log_row.residuals, log_row.objective) = (residuals, objective);
         state.nlp_error = self.nlp_error(ocp, state, &residuals);
