@@ -267,11 +267,12 @@ fn set_driven_state_unit<T: Real>(
     let mut driven = T::ZERO;
     for (place, stage) in variable_places().zip(qp.stages().skip(stages.start)) {
         let Bounds { lower, upper, .. } = stage.x_bounds();
-        let is_bounded =
-            lower.iter().zip(upper).nth(i).is_some_and(|(&lower, &upper)| {
-                lower != upper && (lower.is_finite() || upper.is_finite())
-            });
-        if is_bounded {
+        let is_bounded = lower
+            .iter()
+            .zip(upper)
+            .nth(i)
+            .is_some_and(|(&lower, &upper)| lower != upper && (lower.is_finite() || upper.is_finite()));
+        if is_bounded && !is_unknown {
             return;
         }
         if i >= place.next {

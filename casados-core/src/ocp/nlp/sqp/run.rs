@@ -268,6 +268,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         });
         let Some(next) = next else {
+            if let Some(worst) = self.stationary_violation(ocp, state, log_row)? {
+                return Ok(Some(ocp.infeasible_status(&worst)));
+            }
             return Ok(Some(match failure {
                 // An infeasible QP at one iterate does not prove that the problem is infeasible.
                 None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
