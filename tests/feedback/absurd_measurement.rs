@@ -73,8 +73,8 @@ fn run<P: ExactFormulation<f64>, C: Curvature<P::Dynamics, f64>>(
 }
 
 /// Without a wrong measurement the angle is 4.4e-6 after forty samples. One wrong control of at
-/// most 6 changes the rate by 0.3, and the loop reduces a deviation to a tenth in ten samples: after
-/// 34 samples at most 1e-3 of it are left.
+/// most 6 changes the rate by 0.3, and the loop reduces a deviation to a tenth in ten samples:
+/// after 34 samples at most 1e-3 of it are left.
 #[test]
 fn one_absurd_measurement() -> Test {
     for offset in [1e2, 1e4, 1e6, 1e9, -1e6] {

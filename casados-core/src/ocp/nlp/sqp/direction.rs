@@ -242,47 +242,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         DirectionOutcome::Step
     }
 
-    /// Tests after all attempts at an iterate have failed whether its violations are stationary: the
-    /// feasibility step, with `max_qp_iterations` of its own, leaves as much, and gaps are closed.
-    /// This is the proof of local infeasibility of [`Self::steer_penalty`]. Returns the largest
-    /// violation then.
-    pub(super) fn stationary_violation<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut RunState<'_, T>,
-        log_row: &mut Iteration,
-    ) -> Result<Option<Worst>, OcpError>
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        if !self.options.elastic {
-            return Ok(None);
-        }
-        self.leave_elastic_mode(ocp, state);
-        self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
-        self.enter_elastic_mode(ocp, state, self.options.elastic_penalty);
-        let (worst, bound_violation) = ocp.largest_hard_violation(self.saved_penalties(ocp), &[]);
-        let worst = worst.filter(|worst| worst.violation > self.options.tolerance);
-        let gaps = ocp.gap_sum();
-        let mut verdict = None;
-        if worst.is_some() && gaps <= CLOSED_GAP_RATIO * bound_violation {
-            let current_violation = bound_violation + gaps;
-            let mut row = Iteration { qp_iterations: 0, ..*log_row };
-            let is_stationary = self.solve_feasibility_qp(ocp, state, &mut row, current_violation).is_ok()
-                && self.linearised_violation(ocp) >= STATIONARY_VIOLATION_RATIO * current_violation;
-            log_row.qp_iterations += row.qp_iterations;
-            verdict = worst.filter(|_| is_stationary);
-        }
-        self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
-        self.leave_elastic_mode(ocp, state);
-        // The objective of the QP was replaced.
-        ocp.linearise(self.curvature)?;
-        Ok(match (verdict, state.scaling) {
-            (Some(worst), Some(_)) => Some(self.unscaled_violation(ocp, worst)),
-            (verdict, _) => verdict,
-        })
-    }
-
     /// Allots a share of the remaining iterations to the next QPs.
     fn allot_qp_iterations(&self, state: &mut RunState<'_, T>, log_row: &Iteration, share: f64) {
         let remaining_iterations = self.options.max_qp_iterations.saturating_sub(log_row.qp_iterations);

@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | `bound_multipliers` | multipliers of active bounds, where distances are rounded |
 //! | `multipliers` | least-squares multipliers, where costs have no curvature |
+//! | `attempts` | the attempts at an iterate |
 //! | `direction` | the QP: inertia correction, elastic mode |
 //! | `line_search` | the step length, by the `merit_function` or a filter (`acceptance`) |
 //! | `scaling` | the QP in units |
@@ -15,6 +16,7 @@
 //! | `restart` | the second attempt, from a simulation |
 
 mod acceptance;
+mod attempts;
 mod bound_multipliers;
 mod direction;
 mod line_search;

@@ -227,8 +227,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Computes multipliers of active bounds from the stationarity where the QP solver cannot
-    /// compute them from distances: the rounding error of these, in units, is above the tolerance of
-    /// QPs.
+    /// compute them from distances: the rounding error of these, in units, is above the tolerance
+    /// of QPs.
     pub(super) fn update_bound_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
