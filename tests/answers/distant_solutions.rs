@@ -164,8 +164,9 @@ fn solutions_in_all_units() -> Test {
                     // but for products with units.
                     let said = outcome.residuals.inequalities * (1.0 + 1e-9);
                     assert!(violation <= said, "{far:?} {k} {solver}: {violation:e} {outcome}");
-                    // With an offset of 1e8 a distance of one has eight digits.
-                    let hard = far == Displacement::Offset && k == 8;
+                    // With an offset of 1e8 a distance of one has eight digits: slacks of `Ipm` are
+                    // rounded.
+                    let hard = far == Displacement::Offset && k == 8 && solver.starts_with("Ipm");
                     let solved = outcome.is_converged() || hard && outcome.is_solved();
                     assert!(solved && error < 1e-5, "{far:?} {k} {solver}: {error:e} {outcome}");
                 }

@@ -12,6 +12,7 @@ mod mass;
 mod messages;
 mod outcomes;
 mod print;
+mod profiles;
 mod remedies;
 mod return_map;
 mod sensitivities;

@@ -1,6 +1,7 @@
 //! Control and estimation in closed loop: real-time iterations that contract or diverge, estimates
 //! with their covariance.
 
+mod absurd_measurement;
 mod ball_on_plate;
 mod covariance;
 mod glucose;

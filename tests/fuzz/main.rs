@@ -15,6 +15,7 @@ mod batches;
 mod control;
 mod events;
 mod exported;
+mod feasible;
 mod files;
 mod fixed_step;
 mod horizons;

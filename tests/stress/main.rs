@@ -43,6 +43,7 @@ mod identities;
 mod jumps;
 mod precision;
 mod roots;
+mod roots_of_plants;
 mod scaling;
 mod sensitivities;
 mod start_values;

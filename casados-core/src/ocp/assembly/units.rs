@@ -102,8 +102,15 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// Computes all units at the iterate, where the QP was written without second derivatives of
     /// constraints.
     ///
-    /// `rows` receives a unit for each row; `scratch` has memory for the variables of a stage.
-    pub(in crate::ocp) fn compute_units(&self, rows: &mut [T], scratch: &mut [T]) -> ProblemScaling {
+    /// `rows` receives a unit for each row; `scratch` has memory for the variables of a stage. With
+    /// `has_distant_origins` the unit of a state with a distant origin is that of a state without
+    /// bounds.
+    pub(in crate::ocp) fn compute_units(
+        &self,
+        rows: &mut [T],
+        scratch: &mut [T],
+        has_distant_origins: bool,
+    ) -> ProblemScaling {
         rows.fill(T::ONE);
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         for span in self.problem.spans(qp.dims.len()) {
@@ -118,7 +125,9 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 let stages = if is_single_variable { span.clone() } else { path.clone() };
                 set_variable_unit(qp, v, (stages, i), rows);
             }
-            (0..nx).for_each(|i| set_driven_state_unit(qp, (span.clone(), i), rows));
+            for i in 0..nx {
+                set_driven_state_unit(qp, (span.clone(), i), rows, has_distant_origins);
+            }
             let last_controls = qp.dims.get(last).map_or(0, |dims| dims.nu);
             for j in (0..last_controls).filter(|&j| !is_marked(qp.shared(), j)) {
                 set_variable_unit(qp, v, (terminal.clone(), nx + j), rows);
@@ -236,29 +245,52 @@ fn set_variable_unit<T: Real>(
     }
 }
 
-/// Computes the unit of a state without bounds whose guess is zero: the change by controls in an
-/// interval, at least one, since states accumulate such changes.
+/// Computes the unit of a state without bounds whose guess is zero, or whose origin is distant: the
+/// change by controls in an interval, at least one, since states accumulate such changes.
 ///
+/// An origin is distant if the curvature of such a change is below `NEAR_ONE_RATIO` rounding errors
+/// of the objective unit, the square of the unit: a QP in these units does not see the controls.
 /// Changes by other states are ignored: large terms of dynamics cancel.
-fn set_driven_state_unit<T: Real>(qp: QpView<'_, T>, of: (Stages<usize>, usize), units: &mut [T]) {
-    let (stages, i) = of;
+fn set_driven_state_unit<T: Real>(
+    qp: QpView<'_, T>,
+    (stages, i): (Stages<usize>, usize),
+    units: &mut [T],
+    has_distant_origins: bool,
+) {
     let variable_places =
         || StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage));
     let unit = variable_places().next().map_or(T::ONE, |place| at(units, (place.row + i) as u32));
-    if unit > T::ZERO {
+    let is_unknown = unit == T::ZERO;
+    if !(is_unknown || has_distant_origins) {
         return;
     }
     let mut driven = T::ZERO;
-    for (place, stage) in
-        variable_places().zip(qp.stages().skip(stages.start)).filter(|(place, _)| i < place.next)
-    {
+    for (place, stage) in variable_places().zip(qp.stages().skip(stages.start)) {
+        let Bounds { lower, upper, .. } = stage.x_bounds();
+        let is_bounded = lower
+            .iter()
+            .zip(upper)
+            .nth(i)
+            .is_some_and(|(&lower, &upper)| lower != upper && (lower.is_finite() || upper.is_finite()));
+        if is_bounded && !is_unknown {
+            return;
+        }
+        if i >= place.next {
+            continue;
+        }
         let column = part(stage.arrays().matrix, i * place.ld + place.nx, place.nu);
         for (&b, &unit) in column.iter().zip(part(units, place.row + place.nx, place.nu)) {
             driven = driven.max((b * unit).abs());
         }
     }
+    let change = driven.max(T::ONE);
+    let rounding = T::EPSILON * NEAR_ONE_RATIO * (unit * unit).to_f64();
+    let is_distant = driven > T::ZERO && rounding > (change * change).to_f64();
+    if !(is_unknown || is_distant) {
+        return;
+    }
     let mut range = MagnitudeRange::EMPTY;
-    range.add(driven.max(T::ONE));
+    range.add(change);
     let unit = range.unit_unless_near_one();
     variable_places().filter(|place| i < place.nx).for_each(|place| set(units, place.row + i, unit));
 }

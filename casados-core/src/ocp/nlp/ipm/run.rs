@@ -143,7 +143,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Workspace::new(ocp.ends(), &capacity, self.workspace.as_mut());
         work.units.fill(T::ONE);
         if self.options.scaling {
-            lengths.scaling = ocp.compute_units(work.units, work.scratch);
+            lengths.scaling = ocp.compute_units(work.units, work.scratch, false);
             capacity.scaling = lengths.scaling;
         }
         let push = self.options.push::<T>(self.options.warm_start);

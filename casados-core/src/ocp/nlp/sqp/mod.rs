@@ -6,7 +6,9 @@
 //!
 //! | | |
 //! | --- | --- |
+//! | `bound_multipliers` | multipliers of active bounds, where distances are rounded |
 //! | `multipliers` | least-squares multipliers, where costs have no curvature |
+//! | `attempts` | the attempts at an iterate |
 //! | `direction` | the QP: inertia correction, elastic mode |
 //! | `line_search` | the step length, by the `merit_function` or a filter (`acceptance`) |
 //! | `scaling` | the QP in units |
@@ -14,6 +16,8 @@
 //! | `restart` | the second attempt, from a simulation |
 
 mod acceptance;
+mod attempts;
+mod bound_multipliers;
 mod direction;
 mod line_search;
 mod merit_function;

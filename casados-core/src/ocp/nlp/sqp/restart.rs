@@ -11,11 +11,13 @@ use crate::ocp::nlp::simulation::{
 };
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{QpSolver, Residuals, StageDims, nan_max};
+use crate::qp::{QpSolver, Residuals, SolutionStageMut, StageDims, copy_common, nan_max};
 use crate::scalar::Real;
 
 /// The Levenberg-Marquardt damping of the first direction after a restart.
 const RESTART_DAMPING: f64 = 1.0;
+/// The largest number of simulations with the controls of an iterate in a run.
+const MAX_SIMULATIONS: usize = 4;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Restarts a run at most once, with damped steps as for Gauss-Newton Hessians: after a
@@ -39,13 +41,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let stalls = final_status.is_none() && state.elastic_steps == RESTART_AFTER;
         let may_restart = C::EXACT
             && self.options.restart
-            && !state.second_attempt
             && state.contradictory_bounds.is_none()
-            && log_row.iteration < self.options.max_iterations;
-        if !((failed || stalls)
-            && may_restart
-            && self.curvature.convexification() == Convexification::Reduced)
-        {
+            && log_row.iteration < self.options.max_iterations
+            && self.curvature.convexification() == Convexification::Reduced;
+        let has_verdict = matches!(final_status, Some(Status::Infeasible { .. }));
+        if state.second_attempt && failed && may_restart && !has_verdict {
+            return self.simulate_iterate(ocp, state, log_row);
+        }
+        if !((failed || stalls) && may_restart && !state.second_attempt) {
             return false;
         }
         self.leave_elastic_mode(ocp, state);
@@ -75,10 +78,60 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             ocp.iterate.copy_from(&self.violation_weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
         }
-        // The best iterate of both attempts is kept.
-        let &mut RunState { scaling: sizes, best_residual, best_iteration, .. } = state;
+        self.continue_from_restart(ocp, state);
+        true
+    }
+
+    /// Closes the gaps of the last iterate by a simulation with its controls, at most
+    /// `MAX_SIMULATIONS` times in a run, if the violation decreases to `RESTART_GAIN`: gaps over
+    /// unstable dynamics may leave no QP that is solved. Returns whether the run continues there.
+    fn simulate_iterate<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut RunState<'_, T>,
+        log_row: &Iteration,
+    ) -> bool
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if state.simulations >= MAX_SIMULATIONS || ocp.problem.is_lifted() {
+            return false;
+        }
+        state.simulations += 1;
+        self.leave_elastic_mode(ocp, state);
+        let current_violation = primal_infeasibility(&log_row.residuals);
+        // Functions have values at the states of the guess.
+        self.trial_point.copy_from(&self.violation_weights);
+        self.trial_point.multipliers_mut().fill(T::ZERO);
+        for (k, stage) in ocp.iterate.stages().enumerate() {
+            if let Some(SolutionStageMut { u, .. }) = self.trial_point.stage_mut(k) {
+                copy_common(u, stage.u);
+            }
+        }
+        let ends = self.workspace.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        let is_finite = ocp.simulate_guess(&mut self.trial_point, ends, RestartPoint::Simulation)
+            && ocp.linearise(self.curvature).is_ok();
+        let violation = if is_finite { primal_infeasibility(&ocp.residuals().0) } else { f64::INFINITY };
+        if violation < RESTART_GAIN * current_violation {
+            self.continue_from_restart(ocp, state);
+            return true;
+        }
+        if is_finite {
+            core::mem::swap(&mut ocp.iterate, &mut self.trial_point);
+        }
+        false
+    }
+
+    /// Begins a second attempt at the iterate, where the QP is written.
+    fn continue_from_restart<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut RunState<'_, T>,
+    ) {
+        // The best iterate of all attempts is kept.
+        let &mut RunState { scaling: sizes, best_residual, best_iteration, simulations, .. } = state;
         let over = state.deadline_passed.take();
-        let fresh_state = RunState { best_residual, best_iteration, ..RunState::new() };
+        let fresh_state = RunState { best_residual, best_iteration, simulations, ..RunState::new() };
         *state = RunState {
             deadline_passed: over,
             second_attempt: true,
@@ -87,7 +140,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             ..fresh_state
         };
         self.reset_weights(ocp, state);
-        true
     }
 
     /// Simulates the states with the controls of the guess, makes the result the iterate and

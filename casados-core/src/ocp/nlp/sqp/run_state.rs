@@ -31,6 +31,8 @@ pub(in crate::ocp::nlp) struct RunState<'c, T> {
     pub is_run_start: bool,
     /// Whether the run has restarted.
     pub second_attempt: bool,
+    /// The number of simulations with the controls of an iterate.
+    pub simulations: usize,
     pub line_search: LineSearchState,
     /// Whether bounds have penalties (elastic mode).
     pub is_elastic: bool,
@@ -105,6 +107,7 @@ impl<T> RunState<'_, T> {
             out_of_time: false,
             is_run_start: true,
             second_attempt: false,
+            simulations: 0,
             line_search: LineSearchState::new(),
             is_elastic: false,
             inertia_correction: InertiaCorrection::default(),

@@ -150,7 +150,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) {
         let rows = self.workspace.as_mut().get_mut(saved_penalties_end(ocp)..).unwrap_or_default();
         let ProblemScaling { objective_unit: force, .. } =
-            ocp.compute_units(rows, self.trial_point.view_mut().v);
+            ocp.compute_units(rows, self.trial_point.view_mut().v, true);
         let force = if (1.0 / NEAR_ONE_RATIO..=NEAR_ONE_RATIO).contains(&force) {
             1.0
         } else {
@@ -224,6 +224,22 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let scale = QpScaling { units, direction: way, for_tolerances: false };
         scale.scale_multipliers(self.qp_solution.view_mut());
         scale.scale_multipliers(self.violation_weights.view_mut());
+    }
+
+    /// Computes multipliers of active bounds from the stationarity where the QP solver cannot
+    /// compute them from distances: the rounding error of these, in units, is above the tolerance
+    /// of QPs.
+    pub(super) fn update_bound_multipliers<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &RunState<'_, T>,
+    ) {
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
+        let rounding = ocp.gap_rounding_error();
+        if rounding > self.options.tolerance / (2.0 * NEAR_ONE_RATIO) {
+            ocp.bound_multipliers_by_stationarity(rounding, self.trial_point.view_mut().v);
+        }
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
     }
 
     /// Returns the largest residual, relative to the factors of tolerances.
