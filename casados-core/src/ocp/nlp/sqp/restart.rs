@@ -6,9 +6,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::ocp::nlp::simulation::{
-    GUESS_VIOLATION_RATIO, MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, RestartPoint,
-};
+use crate::ocp::nlp::simulation::RestartPoint;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, nan_max};
@@ -36,7 +34,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             final_status,
             Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_))
         );
-        let stalls = final_status.is_none() && state.elastic_steps == RESTART_AFTER;
+        let stalls =
+            final_status.is_none() && state.elastic_steps == self.options.advanced.restart.restart_after;
         let may_restart = C::EXACT
             && self.options.restart
             && !state.second_attempt
@@ -49,19 +48,24 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         self.leave_elastic_mode(ocp, state);
+        let restart = self.options.advanced.restart;
         let current_violation = primal_infeasibility(&log_row.residuals);
         let mut simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::Simulation);
         let is_infeasible = matches!(final_status, Some(Status::Infeasible { .. }));
         let guess_violation_range =
-            RESTART_GAIN * current_violation..=GUESS_VIOLATION_RATIO * current_violation;
+            restart.restart_gain * current_violation..=restart.guess_violation_ratio * current_violation;
         if is_infeasible
             && simulated_violation.is_some_and(|violation| guess_violation_range.contains(&violation))
         {
             // A guess whose violations did not decrease may be a maximum of them.
-            simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::PerturbedSimulation);
+            simulated_violation = self.linearise_simulated_guess(
+                ocp,
+                RestartPoint::PerturbedSimulation(self.options.advanced.start),
+            );
         }
         if stalls
-            && !simulated_violation.is_some_and(|violation| violation < RESTART_GAIN * current_violation)
+            && !simulated_violation
+                .is_some_and(|violation| violation < restart.restart_gain * current_violation)
         {
             if simulated_violation.is_some() {
                 ocp.iterate.copy_from(&self.trial_point);
@@ -70,7 +74,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         simulated_violation = simulated_violation
-            .filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.guess_violation);
+            .filter(|&violation| violation <= restart.max_simulated_violation * state.guess_violation);
         if simulated_violation.is_none() {
             ocp.iterate.copy_from(&self.violation_weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -78,7 +82,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // The best iterate of both attempts is kept.
         let &mut RunState { scaling: sizes, best_residual, best_iteration, .. } = state;
         let over = state.deadline_passed.take();
-        let fresh_state = RunState { best_residual, best_iteration, ..RunState::new() };
+        let fresh_state = RunState { best_residual, best_iteration, ..RunState::new(&self.options) };
         *state = RunState {
             deadline_passed: over,
             second_attempt: true,
