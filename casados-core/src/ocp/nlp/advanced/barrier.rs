@@ -11,7 +11,8 @@ options! {
     /// assert_eq!(BarrierOptions::DEFAULT.mu_linear_decrease_factor, 0.2);
     /// ```
     BarrierOptions {
-        /// `κ_ε` (WB, section 2.1): a barrier problem is solved if its error is at most this times `μ`.
+        /// `κ_ε` (WB, section 2.1): a barrier problem is solved if its error is at most this times
+        /// `μ`.
         barrier_tol_factor: f64 = 10.0, Positive;
         /// `κ_μ` (WB (7)): the linear decrease of `μ`.
         mu_linear_decrease_factor: f64 = 0.2, BelowOne;
@@ -19,7 +20,7 @@ options! {
         mu_superlinear_decrease_power: f64 = 1.5, AboveOne;
         /// The ratio of the tolerance to the smallest `μ` (WB (7)).
         mu_min_fact: f64 = 10.0, AboveOne;
-        /// `τ_min` (WB (8)): the fraction-to-the-boundary rule keeps at least `1 − max(τ_min, 1 − μ)`.
+        /// `τ_min` (WB (8)): the fraction-to-the-boundary rule keeps `1 − max(τ_min, 1 − μ)`.
         tau_min: f64 = 0.99, BelowOne;
         /// `κ_Σ` (WB (16)): multipliers stay within this factor of `μ/s`.
         kappa_sigma: f64 = 1e10, AboveOne;

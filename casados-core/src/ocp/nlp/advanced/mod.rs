@@ -1,10 +1,11 @@
-//! Advanced options: the constants of [`Ipm`](crate::ocp::Ipm) and [`Sqp`](crate::ocp::Sqp), by strategy.
+//! Advanced options: the constants of [`Ipm`](crate::ocp::Ipm) and [`Sqp`](crate::ocp::Sqp), by
+//! strategy.
 //!
 //! Options have the name that IPOPT or the paper of the method gives them, if there is one. WB is
-//! A. Wächter, L. T. Biegler, Math. Program. 106 (2006); NWW is J. Nocedal, A. Wächter, R. A. Waltz,
-//! SIAM J. Optim. 19 (2009). Lengths, violations and multipliers are in units of the problem
-//! ([`IpmOptions::scaling`](crate::ocp::IpmOptions::scaling)). The pages `docs/algorithms` describe where
-//! each option acts.
+//! A. Wächter, L. T. Biegler, Math. Program. 106 (2006); NWW is J. Nocedal, A. Wächter, R. A.
+//! Waltz, SIAM J. Optim. 19 (2009). Lengths, violations and multipliers are in units of the problem
+//! ([`IpmOptions::scaling`](crate::ocp::IpmOptions::scaling)). The pages `docs/algorithms` describe
+//! where each option acts.
 //!
 //! ```
 //! use casados::ocp::{HeapIpm, Horizon, LeastSquaresCost, Map, Problem};

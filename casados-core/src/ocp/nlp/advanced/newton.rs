@@ -24,9 +24,6 @@ options! {
         /// Refinement stops at this power of the unit roundoff, of values and units of equations
         /// (IPOPT's `residual_ratio_max`, 1e-10).
         residual_exponent: f64 = 2.0 / 3.0, Fraction;
-        /// `δ_c` in units is this power of the unit roundoff (IPOPT's
-        /// `jacobian_regularization_value`, 1e-8).
-        jacobian_regularization_exponent: f64 = 0.5, Fraction;
         /// Initial slacks are at least this power of the unit roundoff (IPOPT's `slack_move`).
         slack_move_exponent: f64 = 0.75, Fraction;
         /// The largest least-squares multiplier at the start; otherwise all are zero (WB, section

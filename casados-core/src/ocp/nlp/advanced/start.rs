@@ -37,8 +37,8 @@ options! {
         /// A gradient vanishes if the change of each variable by its size, or by one, changes the
         /// constraint by at most this fraction of the violation.
         vanishing_gradient: f64 = 1e-8, NotNegative;
-        /// The relative perturbation of the first variable; variable `i` (from zero) is perturbed by
-        /// `1/(i + 1)` of it, so that the point lies on no axis and no diagonal.
+        /// The relative perturbation of the first variable; variable `i` (from zero) is perturbed
+        /// by `1/(i + 1)` of it, so that the point lies on no axis and no diagonal.
         relative_perturbation: f64 = 0.1, Positive;
     }
 }

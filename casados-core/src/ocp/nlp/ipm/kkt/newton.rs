@@ -297,7 +297,8 @@ impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
 /// Computes least-squares multipliers, which minimise the gradient of the Lagrangian: `π` into
 /// `work.next_costates`, those of general constraints into `work.hessian_multipliers`. The
 /// multipliers of bounds of variables are given. Solves Newton's equations with a large multiple,
-/// `identity`, of the identity as Hessian, and without constraint residuals (Wächter and Biegler, section 3.6).
+/// `identity`, of the identity as Hessian, and without constraint residuals (Wächter and Biegler,
+/// section 3.6).
 ///
 /// # Errors
 /// The errors of the recursion.

@@ -57,7 +57,8 @@ pub(in crate::ocp::nlp::ipm) fn status_at_stationary_point<
     None
 }
 
-/// Replaces hard bounds by penalties, in units, and starts with `elastic_mu`; slacks are initialised again.
+/// Replaces hard bounds by penalties, in units, and starts with `elastic_mu`; initialises slacks
+/// again.
 pub(in crate::ocp::nlp::ipm) fn set_elastic_penalties<
     P: Program<T>,
     T: Real,
