@@ -223,8 +223,10 @@ fn one_interval_and_a_control_without_effect() -> Test {
         .on(Horizon::uniform(1, 1.0))?;
     ocp.fix_initial_state(&[0.0; 2])?.guess(&[0.0; 2], &[0.0; 2])?.bound("x[0]", 1.., 1.0, 1.0)?;
     let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
-    assert!(outcome.is_converged() && outcome.iterations <= 5, "{outcome}");
+    assert!(outcome.is_converged(), "{outcome}");
     assert!((ocp.stage(0)?.u[0] - 2.0).abs() < 1e-9, "{outcome}");
+    // ∫ u₀² dt with u₀ = 2; an error of 1e-9 of u₀ changes it by 4e-9.
+    assert!((outcome.objective - 4.0).abs() < 1e-8, "{outcome}");
     Ok(())
 }
 

@@ -137,6 +137,7 @@ pub use formulation::names::Names;
 pub use formulation::problem::{ExactFormulation, Formulation, Problem};
 pub use formulation::program::Program;
 pub use formulation::program::curvature::{Convexification, Curvature, Exact, GaussNewton};
+pub use nlp::advanced;
 #[cfg(feature = "alloc")]
 pub use nlp::ipm::HeapIpm;
 pub use nlp::ipm::{Barrier, Ipm, IpmOptions};

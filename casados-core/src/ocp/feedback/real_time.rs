@@ -21,6 +21,7 @@ use crate::ocp::formulation::program::curvature::Convexification;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::program::curvature::Exact;
 use crate::ocp::formulation::program::curvature::{Curvature, GaussNewton};
+use crate::ocp::nlp::advanced::InertiaOptions;
 use crate::ocp::nlp::inertia_correction::InertiaCorrection;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
@@ -261,7 +262,7 @@ impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
             curvature,
             qp_solver,
             contraction_test: ContractionTest::new::<T>(),
-            inertia: InertiaCorrection::default(),
+            inertia: InertiaCorrection::new(InertiaOptions::QUADRATIC_PROGRAM),
             monitor: None,
             ocp,
             solution,

@@ -1,18 +1,12 @@
 //! Degenerate start: the gradient of a violated constraint vanishes, so that its linearisation has
 //! no solution, as for `u₁² + u₂² = 1` at `u = 0`.
 
+use super::advanced::StartOptions;
 use crate::linalg::dot;
 use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::program::Program;
 use crate::qp::{Bounds, Solution, StageDims, StageOffsetsIter, part};
 use crate::scalar::Real;
-
-/// A gradient counts as vanishing if the change of each variable by its size, or by one, changes
-/// the constraint by at most this fraction of the violation.
-const VANISHING_GRADIENT: f64 = 1e-8;
-/// The relative perturbation of the first variable; variable `i` (from zero) is perturbed by
-/// `1 / (i + 1)` of it, so that the point lies on no axis and no diagonal.
-const RELATIVE_PERTURBATION: f64 = 0.1;
 
 /// The variables that are perturbed.
 #[derive(Clone, Copy, PartialEq)]
@@ -25,7 +19,7 @@ pub(super) enum PerturbedVariables {
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Whether the gradient of a violated constraint vanishes at the iterate. The QP must be
     /// written there.
-    pub(super) fn has_vanishing_gradient(&self) -> bool {
+    pub(super) fn has_vanishing_gradient(&self, vanishing_gradient: f64) -> bool {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
             let (view, stage_variables) = (stage.arrays(), part(v, place.v, place.ld));
@@ -36,14 +30,14 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 let violation = (lower - value).max(value - upper);
                 let changes = row.iter().zip(stage_variables).map(|(&g, &v)| g.abs() * v.abs().max(T::ONE));
                 let largest = changes.fold(T::ZERO, |largest, change| largest.max(change));
-                violation > T::ZERO && largest <= T::from_f64(VANISHING_GRADIENT) * violation
+                violation > T::ZERO && largest <= T::from_f64(vanishing_gradient) * violation
             })
         })
     }
 
     /// Perturbs variables of the iterate within their bounds, equally at all stages: shared
     /// controls remain equal.
-    pub(super) fn perturb_variables(&mut self, which: PerturbedVariables) {
+    pub(super) fn perturb_variables(&mut self, which: PerturbedVariables, options: &StartOptions) {
         let fixed = self.initial_state == InitialState::Fixed;
         let Self { qp, iterate, .. } = self;
         for (k, stage) in qp.view().stages().enumerate() {
@@ -55,7 +49,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             };
             let limits = bounds.lower.iter().zip(bounds.upper);
             for (i, (value, (&lower, &upper))) in values.iter_mut().zip(limits).enumerate() {
-                let size = T::from_f64(RELATIVE_PERTURBATION / (i + 1) as f64) * value.abs().max(T::ONE);
+                let relative = T::from_f64(options.relative_perturbation / (i + 1) as f64);
+                let size = relative * value.abs().max(T::ONE);
                 *value = if *value + size <= upper { *value + size } else { (*value - size).max(lower) };
             }
         }
@@ -71,16 +66,17 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         &mut self,
         copy: &mut Solution<T, D, M>,
         mut linearise: impl FnMut(&mut Self) -> Result<(), E>,
+        options: &StartOptions,
     ) -> Result<bool, E> {
-        if !self.has_vanishing_gradient() {
+        if !self.has_vanishing_gradient(options.vanishing_gradient) {
             return Ok(false);
         }
         copy.copy_from(&self.iterate);
         for which in [PerturbedVariables::Controls, PerturbedVariables::States] {
-            self.perturb_variables(which);
+            self.perturb_variables(which, options);
             self.equalise_shared_controls();
             self.equalise_periodic_states();
-            if linearise(self).is_ok() && !self.has_vanishing_gradient() {
+            if linearise(self).is_ok() && !self.has_vanishing_gradient(options.vanishing_gradient) {
                 return Ok(true);
             }
         }

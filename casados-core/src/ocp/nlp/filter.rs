@@ -3,6 +3,7 @@
 //! R. Fletcher, S. Leyffer, Math. Program. 91 (2002); A. Wächter, L. T. Biegler, Math. Program. 106
 //! (2006), section 2.3, whose symbols are used.
 
+use super::advanced::FilterOptions;
 use crate::scalar::Scalar;
 
 /// Objective and violation at a point.
@@ -33,9 +34,9 @@ impl FilterPair {
 
     /// Whether the violation or the objective is smaller by a margin of `γ_θ` or `γ_φ` times the
     /// violation. Increases of the objective up to `noise` are rounding errors.
-    pub fn is_acceptable_to(&self, other: &Self, noise: f64) -> bool {
-        self.violation <= (1.0 - GAMMA_THETA) * other.violation
-            || self.objective <= other.objective - GAMMA_PHI * other.violation + noise
+    pub fn is_acceptable_to(&self, other: &Self, options: &FilterOptions, noise: f64) -> bool {
+        self.violation <= (1.0 - options.gamma_theta) * other.violation
+            || self.objective <= other.objective - options.gamma_phi * other.violation + noise
     }
 }
 
@@ -46,27 +47,21 @@ impl core::ops::AddAssign for FilterPair {
     }
 }
 
-/// The switching condition (equation (19)): the predicted decrease of the objective is large
-/// relative to the violation, so that the objective must decrease sufficiently.
-pub(in crate::ocp) fn switching_condition_holds(length: f64, slope: f64, violation: f64) -> bool {
-    slope < 0.0 && length * Scalar::powf(-slope, S_PHI) > Scalar::powf(violation, S_THETA)
+impl FilterOptions {
+    /// The switching condition (equation (19)): the predicted decrease of the objective is large
+    /// relative to the violation, so that the objective must decrease sufficiently.
+    pub(in crate::ocp) fn switching_condition_holds(&self, length: f64, slope: f64, violation: f64) -> bool {
+        slope < 0.0 && length * Scalar::powf(-slope, self.s_phi) > Scalar::powf(violation, self.s_theta)
+    }
 }
 
-/// `s_φ`
-pub(in crate::ocp) const S_PHI: f64 = 2.3;
-/// `s_θ`
-pub(in crate::ocp) const S_THETA: f64 = 1.1;
-/// `γ_θ` and `γ_φ`
-pub(in crate::ocp) const GAMMA_THETA: f64 = 1e-5;
-pub(in crate::ocp) const GAMMA_PHI: f64 = 1e-5;
-/// `η_φ`, Armijo's constant.
-pub(in crate::ocp) const ETA_PHI: f64 = 1e-4;
 /// The capacity of the filter; the oldest entry is overwritten.
 const MAX_FILTER_ENTRIES: usize = 64;
 
 /// See the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct Filter {
+    pub options: FilterOptions,
     entries: [FilterPair; MAX_FILTER_ENTRIES],
     insertion_count: usize,
     /// `θ_max`: the largest acceptable violation.
@@ -75,8 +70,9 @@ pub(in crate::ocp) struct Filter {
 
 impl Filter {
     /// An empty filter with `θ_max`.
-    pub fn new(largest_violation: f64) -> Self {
+    pub fn new(options: FilterOptions, largest_violation: f64) -> Self {
         Self {
+            options,
             entries: [FilterPair::default(); MAX_FILTER_ENTRIES],
             insertion_count: 0,
             theta_max: largest_violation,
@@ -92,7 +88,7 @@ impl Filter {
     pub fn is_acceptable(&self, trial_pair: &FilterPair, noise: f64) -> bool {
         let mut entries = self.entries.iter().take(self.insertion_count.min(MAX_FILTER_ENTRIES));
         trial_pair.violation <= self.theta_max
-            && entries.all(|entry| trial_pair.is_acceptable_to(entry, noise))
+            && entries.all(|entry| trial_pair.is_acceptable_to(entry, &self.options, noise))
     }
 
     /// Returns whether the point is acceptable to the iterate; if so, adds the iterate to the
@@ -103,7 +99,7 @@ impl Filter {
         current_pair: &FilterPair,
         noise: f64,
     ) -> bool {
-        let improves = trial_pair.is_acceptable_to(current_pair, noise);
+        let improves = trial_pair.is_acceptable_to(current_pair, &self.options, noise);
         if improves {
             if let Some(entry) = self.entries.get_mut(self.insertion_count % MAX_FILTER_ENTRIES) {
                 *entry = *current_pair;

@@ -1,5 +1,6 @@
 //! Linearisation at the guess.
 
+use super::advanced::StartOptions;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -10,8 +11,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// Linearises at the guess. If a function is not finite there, projects the guess onto the
     /// bounds of states and controls; `copy` holds the guess meanwhile.
     ///
-    /// Perturbs a guess at which the gradient of a violated constraint vanishes, if `may_perturb`.
-    /// Returns whether it has been perturbed.
+    /// With options of the `perturbation`, perturbs a guess at which the gradient of a violated
+    /// constraint vanishes. Returns whether it has been perturbed.
     ///
     /// # Errors
     /// The error at the guess, if the projected guess fails too.
@@ -19,13 +20,11 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         &mut self,
         mut linearise: impl FnMut(&mut Self) -> Result<(), OcpError>,
         copy: &mut Solution<T, D, M>,
-        may_perturb: bool,
+        perturbation: Option<StartOptions>,
     ) -> Result<bool, OcpError> {
         let Err(error) = linearise(self) else {
-            if !may_perturb {
-                return Ok(false);
-            }
-            return self.leave_degenerate_start(copy, linearise);
+            let Some(options) = perturbation else { return Ok(false) };
+            return self.leave_degenerate_start(copy, linearise, &options);
         };
         if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {
             return Err(error);

@@ -1,38 +1,35 @@
 //! Inertia correction: a multiple of the identity is added to a Hessian whose reduced Hessian is
 //! not positive definite (A. Wächter, L. T. Biegler, Math. Program. 106, 2006, section 3.1).
 
+use super::advanced::InertiaOptions;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::qp::{QpError, StageDims};
 use crate::scalar::Real;
 
-/// The first and the smallest regularisation `δ`.
-const FIRST_DELTA: f64 = 1e-6;
-const MIN_DELTA: f64 = 1e-8;
-/// The largest regularisation `δ`.
-const MAX_DELTA: f64 = 1e10;
-/// The factor by which `δ` grows within an iteration, and decreases between iterations.
-const DELTA_FACTOR: f64 = 4.0;
-/// The maximum number of increases of `δ` after QPs that failed for an unknown reason.
-const MAX_UNSOLVED_QPS: usize = 1;
-
 /// The regularisation of the last QP that required one, decreased after each QP that required none.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct InertiaCorrection {
+    options: InertiaOptions,
     last_delta: f64,
 }
 
 impl InertiaCorrection {
+    pub fn new(options: InertiaOptions) -> Self {
+        Self { options, last_delta: 0.0 }
+    }
+
     /// Returns the regularisation to try after `delta`.
     fn next_delta(&mut self, delta: f64) -> f64 {
+        let options = &self.options;
         let next_delta = if delta > 0.0 {
-            DELTA_FACTOR * delta
+            options.perturb_inc_fact * delta
         } else if self.last_delta > 0.0 {
-            (self.last_delta / DELTA_FACTOR).max(MIN_DELTA)
+            (options.perturb_dec_fact * self.last_delta).max(options.min_hessian_perturbation)
         } else {
-            FIRST_DELTA
+            options.first_hessian_perturbation
         };
-        self.last_delta = next_delta.min(MAX_DELTA);
+        self.last_delta = next_delta.min(options.max_hessian_perturbation);
         next_delta
     }
 }
@@ -54,11 +51,11 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                 QpError::NotConvex { .. } => true,
                 QpError::MaxIterations { .. } | QpError::Stalled { .. } => {
                     unsolved_qps += 1;
-                    unsolved_qps <= MAX_UNSOLVED_QPS
+                    unsolved_qps <= correction.options.max_unsolved_qps
                 }
                 _ => false,
             };
-            if !(may_retry && *delta < MAX_DELTA) {
+            if !(may_retry && *delta < correction.options.max_hessian_perturbation) {
                 return Err(error);
             }
             let larger_delta = correction.next_delta(*delta);
@@ -66,7 +63,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             *delta = larger_delta;
         }
         if *delta == 0.0 {
-            correction.last_delta /= DELTA_FACTOR;
+            correction.last_delta *= correction.options.perturb_dec_fact;
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), their
 //! loop (`solver_loop`), and shared parts.
 
+pub mod advanced;
 pub(in crate::ocp) mod bound_consistency;
 mod degenerate_start;
 pub(in crate::ocp) mod elastic_mode;

@@ -10,34 +10,22 @@ use crate::ocp::formulation::instance::data::{Layout, split_data, stage_variable
 use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::Program;
+use crate::ocp::nlp::advanced::StartOptions;
 use crate::ocp::nlp::degenerate_start::PerturbedVariables;
 use crate::qp::{Solution, StageDims, StageOffsetsIter, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// A run restarts from a simulation that violates less than this fraction of the iterate's
-/// violation.
-pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
-/// The largest ratio of violations of a simulation and of the reference point; larger ones are
-/// useless as a start.
-pub(in crate::ocp) const MAX_SIMULATED_VIOLATION: f64 = 1e3;
-
-/// If a simulation with the controls of the guess violates at most this multiple of the iterate,
-/// the violations have not decreased since the guess.
-pub(in crate::ocp) const GUESS_VIOLATION_RATIO: f64 = 1.1;
-
 /// The start of a second run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::ocp) enum RestartPoint {
     /// A simulation with the controls of the guess.
     Simulation,
     /// A simulation with perturbed controls, if the violations of the simulated guess are
     /// stationary but not minimal.
-    PerturbedSimulation,
+    PerturbedSimulation(StartOptions),
 }
-/// The number of consecutive stalled steps after which a run tries to restart.
-pub(in crate::ocp) const RESTART_AFTER: usize = 16;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Projects a guess onto its bounds, simulates its states, with perturbed controls if `start`
@@ -51,8 +39,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     ) -> bool {
         core::mem::swap(&mut self.iterate, guess);
         self.clip_to_bounds();
-        if start == RestartPoint::PerturbedSimulation {
-            self.perturb_variables(PerturbedVariables::Controls);
+        if let RestartPoint::PerturbedSimulation(options) = start {
+            self.perturb_variables(PerturbedVariables::Controls, &options);
         }
         core::mem::swap(&mut self.iterate, guess);
         let has_values = self.close_gaps_by_simulation(guess, ends, &[], f64::INFINITY);

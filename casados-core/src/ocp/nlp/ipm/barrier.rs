@@ -1,5 +1,6 @@
 //! Updates of the barrier parameter `μ`.
 
+use crate::ocp::nlp::advanced::BarrierOptions;
 use crate::qp::element::set;
 use crate::qp::interior::Inequalities;
 use crate::qp::{Residuals, nan_max};
@@ -30,19 +31,14 @@ pub enum Barrier {
     Adaptive,
 }
 
-/// The number of stored KKT errors.
-const KKT_ERROR_RED_ITERS: usize = 4;
-/// `κ`: in free mode the KKT error must be at most this fraction of the largest stored one.
-const KKT_ERROR_RED_FACT: f64 = 0.9999;
-/// The number of consecutive steps without regularisation that ends monotone mode.
-const UNREGULARISED_STEPS_BEFORE_FREE_MODE: usize = 3;
-/// The smallest `μ` at the start of monotone mode, unless the mean complementarity is smaller.
-const MONOTONE_MU_INIT: f64 = 0.1;
+/// The memory for KKT errors.
+const MAX_KKT_ERRORS: usize = 16;
 
 /// State of the adaptive barrier parameter.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp::nlp) struct AdaptiveMu {
-    kkt_errors: [f64; KKT_ERROR_RED_ITERS],
+    options: BarrierOptions,
+    kkt_errors: [f64; MAX_KKT_ERRORS],
     kkt_error_count: usize,
     /// Whether free mode is possible.
     allows_free_mode: bool,
@@ -54,10 +50,11 @@ pub(in crate::ocp::nlp) struct AdaptiveMu {
 
 impl AdaptiveMu {
     /// The state at the start of a run.
-    pub fn new(barrier: Barrier) -> Self {
+    pub fn new(barrier: Barrier, options: BarrierOptions) -> Self {
         let adapts = barrier == Barrier::Adaptive;
         Self {
-            kkt_errors: [0.0; KKT_ERROR_RED_ITERS],
+            options,
+            kkt_errors: [0.0; MAX_KKT_ERRORS],
             kkt_error_count: 0,
             allows_free_mode: adapts,
             in_free_mode: adapts,
@@ -85,15 +82,16 @@ impl AdaptiveMu {
         mean_complementarity: f64,
         tolerance: f64,
     ) -> f64 {
-        let current_error = error(0.0);
-        let largest = self.kkt_errors.iter().take(self.kkt_error_count).fold(0.0, |m: f64, &e| m.max(e));
+        let options = self.options;
+        let (current_error, count) = (error(0.0), options.adaptive_mu_kkterror_red_iters);
+        let errors = self.kkt_errors.iter().take(self.kkt_error_count.min(count));
+        let largest = errors.fold(0.0, |m: f64, &e| m.max(e));
         let error_decreases =
-            self.kkt_error_count < KKT_ERROR_RED_ITERS || current_error <= KKT_ERROR_RED_FACT * largest;
-        if error_decreases
-            && (self.in_free_mode
-                || self.allows_free_mode && self.unregularised_steps >= UNREGULARISED_STEPS_BEFORE_FREE_MODE)
-        {
-            if let Some(error) = self.kkt_errors.get_mut(self.kkt_error_count % KKT_ERROR_RED_ITERS) {
+            self.kkt_error_count < count || current_error <= options.adaptive_mu_kkterror_red_fact * largest;
+        let leaves_monotone_mode =
+            self.allows_free_mode && self.unregularised_steps >= options.unregularised_steps_before_free_mode;
+        if error_decreases && (self.in_free_mode || leaves_monotone_mode) {
+            if let Some(error) = self.kkt_errors.get_mut(self.kkt_error_count % count.max(1)) {
                 *error = current_error;
             }
             self.kkt_error_count += 1;
@@ -102,9 +100,9 @@ impl AdaptiveMu {
         }
         if self.in_free_mode {
             self.in_free_mode = false;
-            return initial_monotone_mu(mu, mean_complementarity);
+            return self.initial_monotone_mu(mu, mean_complementarity);
         }
-        decrease_mu(mu, error, tolerance)
+        options.decrease_mu(mu, error, tolerance)
     }
 
     /// Counts a step. Returns the first `μ` of monotone mode if a regularised step ends free mode.
@@ -112,13 +110,13 @@ impl AdaptiveMu {
         self.unregularised_steps = if regularised { 0 } else { self.unregularised_steps + 1 };
         let ends = regularised && self.in_free_mode;
         self.in_free_mode &= !regularised;
-        ends.then(|| initial_monotone_mu(mu, mean_complementarity))
+        ends.then(|| self.initial_monotone_mu(mu, mean_complementarity))
     }
-}
 
-/// The first `μ` of monotone mode.
-fn initial_monotone_mu(mu: f64, mean_complementarity: f64) -> f64 {
-    mu.max(mean_complementarity.min(MONOTONE_MU_INIT))
+    /// The first `μ` of monotone mode.
+    fn initial_monotone_mu(&self, mu: f64, mean_complementarity: f64) -> f64 {
+        mu.max(mean_complementarity.min(self.options.monotone_mu_init))
+    }
 }
 
 /// The mean product of slacks and multipliers.
@@ -128,17 +126,27 @@ pub(super) fn mean_complementarity<T: Real>(inequalities: &Inequalities<'_, T>) 
     products.fold(0.0, |sum, product| sum + product) / inequalities.slack.len().max(1) as f64
 }
 
-/// The smallest `μ`.
-pub(super) fn min_mu(tolerance: f64) -> f64 {
-    tolerance / 10.0
-}
+impl BarrierOptions {
+    /// The smallest `μ`.
+    pub(super) fn min_mu(&self, tolerance: f64) -> f64 {
+        tolerance / self.mu_min_fact
+    }
 
-/// `κ_ε`: a barrier problem is solved accurately enough if its error is at most `κ_ε μ`.
-const KAPPA_EPSILON: f64 = 10.0;
-/// `κ_μ`
-const KAPPA_MU: f64 = 0.2;
-/// `θ_μ`
-const THETA_MU: f64 = 1.5;
+    /// Decreases `μ` while the error of its barrier problem is small enough.
+    fn decrease_mu(&self, mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64 {
+        let (mut mu, min_mu) = (mu, self.min_mu(tolerance));
+        while mu > min_mu && error(mu) <= self.barrier_tol_factor * mu {
+            let superlinear = Scalar::powf(mu, self.mu_superlinear_decrease_power);
+            mu = (self.mu_linear_decrease_factor * mu).min(superlinear).max(min_mu);
+        }
+        mu
+    }
+
+    /// `τ`: the fraction-to-the-boundary rule keeps at least `1 − τ` of slacks and multipliers.
+    pub(super) fn fraction_to_boundary(&self, mu: f64) -> f64 {
+        (1.0 - mu).max(self.tau_min)
+    }
+}
 
 /// `E_μ`: the largest residual of the barrier problem.
 pub(super) fn barrier_error(residuals: &Residuals, complementarity_error: f64) -> f64 {
@@ -160,20 +168,6 @@ pub(super) fn barrier_residuals<T: Real>(inequalities: &Inequalities<'_, T>, mu:
     (largest, max_complementarity_error(inequalities.slack, inequalities.multiplier, mu))
 }
 
-/// Decreases `μ` while the error of its barrier problem is small enough.
-pub(super) fn decrease_mu(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64 {
-    let (mut mu, min_mu) = (mu, min_mu(tolerance));
-    while mu > min_mu && error(mu) <= KAPPA_EPSILON * mu {
-        mu = (KAPPA_MU * mu).min(Scalar::powf(mu, THETA_MU)).max(min_mu);
-    }
-    mu
-}
-
-/// `τ`: the fraction-to-the-boundary rule keeps at least `1 − τ` of slacks and multipliers.
-pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
-    (1.0 - mu).max(0.99)
-}
-
 /// Sets slacks below half of the distance from their bound to that distance, if they differ by at
 /// most `max_residual`. Multipliers decrease accordingly: the products `s λ` are unchanged.
 ///
@@ -182,7 +176,7 @@ pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
 /// distance.
 pub(super) fn reset_small_slacks<T: Real>(
     inequalities: &mut Inequalities<'_, T>,
-    mu: f64,
+    (mu, kappa_sigma): (f64, f64),
     max_residual: f64,
 ) {
     let small = T::from_f64(max_residual);
@@ -194,19 +188,20 @@ pub(super) fn reset_small_slacks<T: Real>(
             (*multiplier, *slack, *residual) = (*multiplier * *slack / new_slack, new_slack, T::ZERO);
         }
     }
-    correct_bound_multipliers(inequalities, mu);
+    correct_bound_multipliers(inequalities, mu, kappa_sigma);
 }
-
-/// `κ_Σ`: bounds multipliers to `μ/s` times `1/κ_Σ` to `κ_Σ`.
-const KAPPA_SIGMA: f64 = 1e10;
 
 /// Keeps multipliers within a factor `κ_Σ` of `μ/s`, and the sum of both multipliers of a soft
 /// bound equal to the derivative of its penalty.
-pub(super) fn correct_bound_multipliers<T: Real>(inequalities: &mut Inequalities<'_, T>, mu: f64) {
+pub(super) fn correct_bound_multipliers<T: Real>(
+    inequalities: &mut Inequalities<'_, T>,
+    mu: f64,
+    kappa_sigma: f64,
+) {
     let count = inequalities.counts.sides();
     for (multiplier, &slack) in inequalities.multiplier.iter_mut().zip(&*inequalities.slack).take(count) {
         let centre = mu / slack.to_f64();
-        let clamped = multiplier.to_f64().clamp(centre / KAPPA_SIGMA, centre * KAPPA_SIGMA);
+        let clamped = multiplier.to_f64().clamp(centre / kappa_sigma, centre * kappa_sigma);
         *multiplier = T::from_f64(clamped);
     }
     let costs = inequalities.linear.iter().zip(&*inequalities.quadratic);

@@ -14,13 +14,6 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// If `δ_w` exceeds this bound (in units) far from a feasible point, the multipliers are reset:
-/// their curvature leaves steps of the size of rounding errors, and the multipliers grow with
-/// `δ_w`.
-const MULTIPLIER_RESET_DELTA_W: f64 = 10.0;
-/// If violations and gaps are at most this (in units), the multipliers are kept.
-const MULTIPLIER_RESET_VIOLATION: f64 = 1.0;
-
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Computes the search direction. Resets the multipliers, and with them the curvature of
     /// dynamics and constraints, if this curvature requires too large a `δ_w` far from a feasible
@@ -34,11 +27,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
+        let newton = self.options.advanced.newton;
         let saved = (state.regularisation, state.adaptive_mu, state.mu);
         let direction = self.regularised_direction(ocp, state, log_row);
         let is_regularised = direction.is_err()
-            || state.delta_w > MULTIPLIER_RESET_DELTA_W * state.dimensions.scaling.objective_unit;
-        if !is_regularised || state.violation <= MULTIPLIER_RESET_VIOLATION {
+            || state.delta_w > newton.multiplier_reset_delta_w * state.dimensions.scaling.objective_unit;
+        if !is_regularised || state.violation <= newton.multiplier_reset_violation {
             return Ok(direction);
         }
         (state.regularisation, state.adaptive_mu, state.mu) = saved;
@@ -81,7 +75,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         log_row: &mut Iteration,
     ) -> Result<bool, QpError> {
         let objective_unit = state.dimensions.scaling.objective_unit;
-        let min_mu = barrier::min_mu(self.options.product_tolerance(state.product_unit));
+        let advanced = self.options.advanced;
+        let min_mu = advanced.barrier.min_mu(self.options.product_tolerance(state.product_unit));
         let units = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units;
         let mut iterate =
             kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
@@ -106,14 +101,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
         } else if in_free_mode {
             state.mu = predictor::probing_mu(&iterate.inequalities, min_mu);
-            is_corrected =
-                predictor::corrected_step(&mut iterate, state.mu, objective_unit, state.violation)?;
+            let unit_and_violation = (objective_unit, state.violation);
+            is_corrected = predictor::corrected_step(&mut iterate, state.mu, unit_and_violation, &advanced)?;
         }
         if in_free_mode {
             state.filter.clear();
         }
         log_row.barrier = state.mu;
-        refine_step(&mut iterate, units)?;
+        refine_step(&mut iterate, units, &advanced.newton)?;
         Ok(is_corrected)
     }
 }

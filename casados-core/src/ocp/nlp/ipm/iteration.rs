@@ -31,9 +31,6 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// The largest ratio of violations after and before a step. The reference is at most the initial
-/// violation, or one: a decreasing objective must not lead far from feasible points.
-const MAX_VIOLATION_GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian without convexification.
 const EXACT_HESSIAN: Exact = Exact { convexification: Convexification::None };
 
@@ -111,8 +108,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
         let units = state.dimensions.units(work.units);
         state.update_product_unit(objective);
+        let (units_of_residuals, newton) = ((units, state.product_unit), &self.options.advanced.newton);
         let scaled =
-            scaled_residuals(&residuals, &iterate, view.dynamics, (units, state.product_unit), of_stages);
+            scaled_residuals(&residuals, &iterate, view.dynamics, units_of_residuals, of_stages, newton);
         state.update_mu(&iterate, &scaled, &self.options);
         let ScaledResiduals {
             barrier_residuals: (barrier, _),
@@ -175,13 +173,16 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 kkt_indices,
                 trial_point,
                 workspace: &mut workspace,
+                options: &self.options.advanced,
             };
             current_pair = line_search.evaluate_trial(ocp, state.mu, 0.0).unwrap_or(current_pair);
         }
         if !state.filter_is_initialised {
             state.initial_violation = current_pair.violation;
-            state.theta_min = 1e-4 * current_pair.violation.max(1.0);
-            state.filter = Filter::new(1e4 * current_pair.violation.max(1.0));
+            let options = self.options.advanced.filter;
+            let reference_violation = current_pair.violation.max(1.0);
+            state.theta_min = options.theta_min_fact * reference_violation;
+            state.filter = Filter::new(options, options.theta_max_fact * reference_violation);
             state.filter_is_initialised = true;
         }
         Ok(current_pair)
@@ -202,9 +203,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let iterate =
             kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let reference_violation = state.initial_violation.max(1.0);
-        let noise = T::from_f64(10.0 * T::EPSILON);
+        let (options, newton) = (self.options.advanced.line_search, &self.options.advanced.newton);
+        let noise = T::from_f64(options.rounding_units * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
-        let (equation_residual, equation_residual_sum) = equation_residuals_after_step(&iterate, work.units);
+        let (equation_residual, equation_residual_sum) =
+            equation_residuals_after_step(&iterate, work.units, newton);
         let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + equation_residual_sum;
         let objective_unit = state.dimensions.scaling.objective_unit;
         let (slope, gradient_terms) = barrier_function::barrier_slope(&iterate, state.mu, work.scratch);
@@ -212,20 +215,23 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             current: here,
             slope: slope / objective_unit,
             // Rounding errors of the function and of the point.
-            noise: 10.0 * f64::EPSILON * (here.objective.abs() + gradient_terms / objective_unit),
+            noise: options.rounding_units
+                * f64::EPSILON
+                * (here.objective.abs() + gradient_terms / objective_unit),
             theta_min: state.theta_min,
-            max_violation: (MAX_VIOLATION_GROWTH * here.violation.min(reference_violation))
+            max_violation: (options.max_violation_growth * here.violation.min(reference_violation))
                 .max(reference_violation),
             mu: state.mu,
             delta_w: state.delta_w,
             rounding_violation: rounding,
             equation_residual,
         };
-        let tau = barrier::fraction_to_boundary(state.mu / objective_unit);
+        let tau = self.options.advanced.barrier.fraction_to_boundary(state.mu / objective_unit);
         let (primal, dual) = predictor::step_lengths(&iterate.inequalities, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
-        let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
-        let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
+        let tiny_step_tol = T::from_f64(options.tiny_step_tol * T::EPSILON);
+        let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= tiny_step_tol * (unit + v.abs());
+        let tiny = here.violation <= options.tiny_step_violation && steps.all(is_tiny);
         Ok(SearchDirection {
             filter_model: expected,
             tau,
@@ -253,7 +259,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let dimensions = state.dimensions;
         macro_rules! line_search {
             ($workspace:ident) => {{
-                let Self { trial_point, kkt_numbers, kkt_indices, workspace, .. } = &mut *self;
+                let Self { trial_point, kkt_numbers, kkt_indices, workspace, options, .. } = &mut *self;
                 $workspace = Workspace::new(ocp.ends(), &state.max_dimensions, workspace.as_mut());
                 LineSearch {
                     dimensions: &dimensions,
@@ -261,6 +267,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                     kkt_indices,
                     trial_point,
                     workspace: &mut $workspace,
+                    options: &options.advanced,
                 }
             }};
         }
@@ -277,6 +284,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             refine_step(
                 &mut iterate,
                 Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units,
+                &self.options.advanced.newton,
             )?;
             *direction = self.prepare_line_search(ocp, state, current_pair, false)?;
             self.expand_stage_steps(ocp, state)?;
@@ -321,7 +329,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             *of_hessian = *of_hessian + alpha_number * (multiplier + step - *of_hessian);
         }
         iterate.step_point(alpha_number, T::from_f64(dual));
-        barrier::correct_bound_multipliers(&mut iterate.inequalities, state.mu);
+        let kappa_sigma = self.options.advanced.barrier.kappa_sigma;
+        barrier::correct_bound_multipliers(&mut iterate.inequalities, state.mu, kappa_sigma);
         iterate.store(&mut view);
         ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
         // The line search has evaluated the accepted point; a tiny step has no line search.
@@ -371,7 +380,7 @@ where
         log_row: &mut Iteration,
         watch: &mut Stopwatch,
     ) -> Result<Option<Status>, OcpError> {
-        if state.is_complementarity_stalled() {
+        if state.is_complementarity_stalled(self.options.advanced.barrier.complementarity_stall_iterations) {
             self.reset_small_slacks(ocp, state)?;
         }
         let direction = self.search_direction(ocp, state, log_row)?.and_then(|is_corrected| {
@@ -403,7 +412,7 @@ where
             LineSearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
         };
         (log_row.step, log_row.corrected) = (accepted.alpha, accepted.corrected);
-        state.count_stalled_step(log_row.step);
+        state.count_stalled_step(log_row.step, self.options.advanced.restart.short_step);
         state.regularisation.update_damping(log_row.step / direction.max_alpha_primal);
         self.apply_step(ocp, state, &direction, accepted)?;
         let min_mu = self.options.tolerance * tolerance_factor(state.product_unit);

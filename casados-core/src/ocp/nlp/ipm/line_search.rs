@@ -8,19 +8,11 @@ use super::run_state::RunState;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
-use crate::ocp::nlp::filter::{
-    ETA_PHI, Filter, FilterPair, GAMMA_PHI, GAMMA_THETA, S_PHI, S_THETA, switching_condition_holds,
-};
+use crate::ocp::nlp::advanced::{AdvancedIpmOptions, FilterOptions};
+use crate::ocp::nlp::filter::{Filter, FilterPair};
 use crate::qp::interior::Iterate;
 use crate::qp::{Solution, StageDims, StageOffsetsIter, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
-
-/// `γ_α`, a factor of the shortest step.
-const ALPHA_MIN_FRAC: f64 = 0.05;
-/// The largest number of second-order corrections of a step.
-const MAX_SOC: usize = 4;
-/// `κ_soc`: a correction that leaves more than this fraction of the violation is the last one.
-const KAPPA_SOC: f64 = 0.99;
 
 /// The filter's model of the barrier function along the search direction.
 #[derive(Clone, Copy, Debug)]
@@ -46,23 +38,24 @@ pub(super) struct FilterModel {
 
 impl FilterModel {
     /// Whether the barrier function must decrease sufficiently for a step of this length.
-    fn switching_condition_holds(&self, alpha: f64) -> bool {
+    fn switching_condition_holds(&self, options: &FilterOptions, alpha: f64) -> bool {
         self.current.violation <= self.theta_min
-            && switching_condition_holds(alpha, self.slope, self.current.violation)
+            && options.switching_condition_holds(alpha, self.slope, self.current.violation)
     }
 
     /// The shortest acceptable step (equation (23)).
-    fn min_alpha(&self) -> f64 {
-        let FilterPair { violation, .. } = self.current;
-        let mut smallest_ratio: f64 = GAMMA_THETA;
+    fn min_alpha(&self, options: &AdvancedIpmOptions) -> f64 {
+        let (FilterPair { violation, .. }, filter) = (self.current, &options.filter);
+        let mut smallest_ratio = filter.gamma_theta;
         if self.slope < 0.0 {
-            smallest_ratio = smallest_ratio.min(GAMMA_PHI * violation / -self.slope);
+            smallest_ratio = smallest_ratio.min(filter.gamma_phi * violation / -self.slope);
             if violation <= self.theta_min {
-                let powers = (Scalar::powf(violation, S_THETA), Scalar::powf(-self.slope, S_PHI));
+                let powers =
+                    (Scalar::powf(violation, filter.s_theta), Scalar::powf(-self.slope, filter.s_phi));
                 smallest_ratio = smallest_ratio.min(powers.0 / powers.1);
             }
         }
-        (ALPHA_MIN_FRAC * smallest_ratio).max(1e-14)
+        (options.line_search.alpha_min_frac * smallest_ratio).max(options.line_search.min_alpha)
     }
 
     /// Whether violation and barrier function change by rounding errors and by the residuals that
@@ -87,8 +80,10 @@ impl FilterModel {
         {
             return false;
         }
-        if self.switching_condition_holds(alpha) {
-            return trial_pair.objective <= self.current.objective + ETA_PHI * alpha * self.slope + noise;
+        let options = &filter.options;
+        if self.switching_condition_holds(options, alpha) {
+            let decrease = options.eta_phi * alpha * self.slope;
+            return trial_pair.objective <= self.current.objective + decrease + noise;
         }
         filter.augment_if_improved(trial_pair, &self.current, noise)
     }
@@ -119,6 +114,7 @@ pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
     pub kkt_indices: &'r mut I,
     pub trial_point: &'r mut Solution<T, D, M>,
     pub workspace: &'r mut Workspace<'w, T>,
+    pub options: &'r AdvancedIpmOptions,
 }
 
 impl<T, D, M, N, I> LineSearch<'_, '_, T, D, M, N, I>
@@ -155,7 +151,7 @@ where
     ) -> Result<LineSearchOutcome, OcpError> {
         let RunState { filter, deadline_passed: over, .. } = state;
         let mut alpha = max_alpha;
-        let min_alpha = model.min_alpha();
+        let min_alpha = model.min_alpha(self.options);
         while alpha >= min_alpha {
             let trial_pair = self.evaluate_trial(ocp, model.mu, alpha);
             if trial_pair.is_some_and(|there| model.accepts(filter, alpha, &there)) {
@@ -173,7 +169,7 @@ where
             if over() {
                 return Ok(LineSearchOutcome::OutOfTime);
             }
-            alpha *= 0.5;
+            alpha *= self.options.line_search.alpha_red_factor;
         }
         Ok(LineSearchOutcome::NoStep)
     }
@@ -261,7 +257,7 @@ where
         }
         let mut violation = model.current.violation;
         let mut accepted = None;
-        for _ in 0..MAX_SOC {
+        for _ in 0..self.options.line_search.max_soc {
             ocp.set_second_order_correction(self.trial_point, self.workspace.interval_ends);
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
@@ -277,7 +273,7 @@ where
                 evaluate_linear_residuals(&mut iterate);
                 let (mu, delta) = (T::from_f64(model.mu), T::from_f64(model.delta_w));
                 let solved = super::kkt::newton::newton_step(&mut iterate, mu, delta)
-                    .and_then(|()| refine_step(&mut iterate, self.workspace.units));
+                    .and_then(|()| refine_step(&mut iterate, self.workspace.units, &self.options.newton));
                 (
                     solved,
                     max_step_to_boundary(iterate.inequalities.slack, iterate.inequalities.slack_step, tau),
@@ -291,7 +287,7 @@ where
                 accepted = Some(alpha);
                 break;
             }
-            if trial_pair.violation > KAPPA_SOC * violation {
+            if trial_pair.violation > self.options.line_search.kappa_soc * violation {
                 break;
             }
             violation = trial_pair.violation;

@@ -17,9 +17,6 @@ use crate::ocp::formulation::program::Program;
 use crate::qp::{StageDims, Store, copy_common};
 use crate::scalar::Real;
 
-/// The largest initial multiplier in units; if one is larger, all are discarded.
-const CONSTR_MULT_INIT_MAX: f64 = 1e3;
-
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Initialises slacks and multipliers in the first iteration, or for new penalties.
     pub(super) fn initialise_slacks_and_multipliers<P: Program<T>>(
@@ -50,6 +47,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.load_initial_state();
         evaluate_linear_residuals(&mut iterate);
         let objective_unit = state.dimensions.scaling.objective_unit;
+        let newton = self.options.advanced.newton;
+        let identity = newton.identity_hessian_weight * objective_unit;
         initialise_inequalities(&mut iterate, &self.options, warm, state.mu, units, &view);
         if state.dimensions.in_restoration {
             phase::start_on_central_path(&mut iterate.inequalities, state.mu);
@@ -57,9 +56,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.store(&mut view);
         if warm {
             copy_common(work.hessian_multipliers, iterate.inequalities.multiplier);
-        } else if least_squares_multipliers(&mut iterate, &mut work, objective_unit).is_ok() {
-            let is_small =
-                |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * objective_unit);
+        } else if least_squares_multipliers(&mut iterate, &mut work, identity).is_ok() {
+            let largest = T::from_f64(newton.constr_mult_init_max * objective_unit);
+            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= largest;
             let sides =
                 scaling::row_values_with_units(iterate.inequalities.rows, work.hessian_multipliers, rows);
             if scaling::gaps_with_units(iterate.qp.dims, work.next_costates, rows).chain(sides).all(is_small)
@@ -101,7 +100,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
-        barrier::reset_small_slacks(&mut iterate.inequalities, state.mu, self.options.tolerance);
+        let kappa_sigma = self.options.advanced.barrier.kappa_sigma;
+        let tolerance = self.options.tolerance;
+        barrier::reset_small_slacks(&mut iterate.inequalities, (state.mu, kappa_sigma), tolerance);
         let mut view = solution.view_mut();
         iterate.store(&mut view);
         evaluate_residuals(&mut iterate, &mut view);

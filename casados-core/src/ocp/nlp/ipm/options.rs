@@ -3,10 +3,8 @@
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::nlp::advanced::AdvancedIpmOptions;
 use crate::scalar::{Real, Scalar};
-
-/// IPOPT's `slack_move`, as an exponent of the unit roundoff.
-const SLACK_MOVE: f64 = 0.75;
 
 /// Options of [`Ipm`](super::Ipm). Symbols are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
@@ -83,6 +81,8 @@ pub struct IpmOptions {
     /// guess, or with perturbed controls if the violations are still those of the guess. Default
     /// true.
     pub restart: bool,
+    /// The constants of the algorithm.
+    pub advanced: AdvancedIpmOptions,
 }
 
 impl IpmOptions {
@@ -106,6 +106,7 @@ impl IpmOptions {
             elastic_penalty: 1e2,
             perturb_start: true,
             restart: true,
+            advanced: AdvancedIpmOptions::DEFAULT,
         }
     }
 
@@ -120,7 +121,7 @@ impl IpmOptions {
     /// step too short.
     pub(super) fn push<T: Real>(&self, warm: bool) -> T {
         let push = if warm { self.warm_push } else { self.bound_push };
-        T::from_f64(push.max(Scalar::powf(T::EPSILON, SLACK_MOVE)))
+        T::from_f64(push.max(Scalar::powf(T::EPSILON, self.advanced.newton.slack_move_exponent)))
     }
 
     /// The first barrier parameter, scaled by the objective unit.
@@ -153,6 +154,6 @@ impl IpmOptions {
                 return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 0.5" });
             }
         }
-        Ok(())
+        self.advanced.validate()
     }
 }

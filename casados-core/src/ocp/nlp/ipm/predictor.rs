@@ -9,19 +9,10 @@
 use super::barrier;
 use super::kkt::newton::resolve;
 use super::line_search::max_step_to_boundary;
+use crate::ocp::nlp::advanced::AdvancedIpmOptions;
 use crate::qp::QpError;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
-
-/// The largest number of higher-order corrections, each for the products of the last step. They use
-/// the same factors and cost little compared to derivatives. Where a slack and its multiplier both
-/// vanish, a step leaves a fifteenth of their product instead of a seventh.
-const MAX_CORRECTIONS: usize = 3;
-/// The violation, in units, above which there is only one correction: the QP is a poor model there.
-const MULTIPLE_CORRECTIONS_VIOLATION: f64 = 0.3;
-/// The smallest length of a corrected step; shorter ones are replaced by the uncorrected step,
-/// since the products differ too much for the correction.
-const MIN_CORRECTED_STEP: f64 = 0.6;
 
 /// Returns the primal and the dual step length that keep `1 − τ` of slacks and multipliers.
 pub(super) fn step_lengths<T: Real>(inequalities: &Inequalities<'_, T>, tau: f64) -> (f64, f64) {
@@ -62,16 +53,19 @@ pub(super) fn probing_mu<T: Real>(inequalities: &Inequalities<'_, T>, min_mu: f6
 pub(super) fn corrected_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: f64,
-    objective_unit: f64,
-    violation: f64,
+    (objective_unit, violation): (f64, f64),
+    AdvancedIpmOptions { predictor, barrier, .. }: &AdvancedIpmOptions,
 ) -> Result<bool, QpError> {
-    let corrections = if violation <= MULTIPLE_CORRECTIONS_VIOLATION { MAX_CORRECTIONS } else { 1 };
+    let allows_several = violation <= predictor.multiple_corrections_violation;
+    let corrections = predictor.max_corrections.min(if allows_several { usize::MAX } else { 1 });
     for _ in 0..corrections {
         resolve(iterate, T::from_f64(mu), true)?;
     }
-    let tau = barrier::fraction_to_boundary(mu / objective_unit);
+    let tau = barrier.fraction_to_boundary(mu / objective_unit);
     let (primal, dual) = step_lengths(&iterate.inequalities, tau);
-    let is_accepted = primal.min(dual) >= MIN_CORRECTED_STEP && iterate.step.iter().all(|d| d.is_finite());
+    let is_accepted = corrections > 0
+        && primal.min(dual) >= predictor.min_corrected_step
+        && iterate.step.iter().all(|d| d.is_finite());
     if !is_accepted {
         resolve(iterate, T::from_f64(mu), false)?;
     }

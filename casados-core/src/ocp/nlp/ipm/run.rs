@@ -16,8 +16,6 @@ use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
-/// IPOPT's `diverging_iterates_tol`, relative to the largest magnitude in the data of the problem.
-const DIVERGING_ITERATES: f64 = 1e12;
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Solves a problem from its iterate. Afterwards the iterate is the best one, whatever the
     /// status, or the last one after `Converged` and `Infeasible`.
@@ -100,13 +98,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         self.options.validate()?;
         ocp.initialise_stages(self.options.warm_start)?;
         // The QP contains the bounds of constraints only after it is written.
-        let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial_point, self.options.perturb_start)?;
+        let perturbation = self.options.perturb_start.then_some(self.options.advanced.start);
+        let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial_point, perturbation)?;
         let (lengths, capacity, is_linearised) = self.initialise(ocp)?;
         let mut state = RunState::new(deadline_passed, (lengths, capacity), is_linearised, &self.options);
         state.has_perturbed_start = perturbed;
         state.initial_objective = ocp.objective.to_f64();
         state.contradictory_bounds = ocp.contradictory_bounds(self.options.tolerance);
-        state.diverging_iterates_tol = DIVERGING_ITERATES * ocp.largest_magnitude();
+        state.diverging_iterates_tol =
+            self.options.advanced.unbounded.diverging_iterates_tol * ocp.largest_magnitude();
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();

@@ -14,14 +14,6 @@ use crate::qp::Residuals;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
 
-/// Complementarity stalls if in so many consecutive iterations it is the only residual above the
-/// tolerance, and at least this fraction of the error remains.
-const COMPLEMENTARITY_STALL_ITERATIONS: usize = 3;
-const STALLED_COMPLEMENTARITY_RATIO: f64 = 0.9;
-
-/// Steps up to this length count as stalled.
-const SHORT_STEP: f64 = 1.0 / 32.0;
-
 /// State of a run, kept between iterations.
 pub(in crate::ocp::nlp) struct RunState<'c> {
     /// Whether the deadline has passed.
@@ -101,6 +93,7 @@ impl<'c> RunState<'c> {
         options: &IpmOptions,
     ) -> Self {
         // Products that do not vanish cannot be predicted by an affine-scaling step.
+        let advanced = &options.advanced;
         let barrier = if options.final_mu > 0.0 { Barrier::Monotone } else { options.barrier };
         Self {
             deadline_passed: over,
@@ -108,11 +101,11 @@ impl<'c> RunState<'c> {
             max_dimensions: capacity,
             has_perturbed_start: false,
             mu: options.scaled_start_mu(lengths.scaling.objective_unit),
-            adaptive_mu: AdaptiveMu::new(barrier),
-            filter: Filter::new(f64::INFINITY),
+            adaptive_mu: AdaptiveMu::new(barrier, advanced.barrier),
+            filter: Filter::new(advanced.filter, f64::INFINITY),
             theta_min: f64::INFINITY,
             initial_violation: f64::INFINITY,
-            regularisation: Regularisation::default(),
+            regularisation: Regularisation::new(advanced.inertia, advanced.damping),
             delta_w: 0.0,
             elastic_penalty: None,
             second_attempt: false,
@@ -149,8 +142,8 @@ impl<'c> RunState<'c> {
     }
 
     /// Counts stalled steps: short ones, and steps of the restoration phase.
-    pub fn count_stalled_step(&mut self, step: f64) {
-        let stalls = self.restoration.outer_objective_unit.is_some() || step <= SHORT_STEP;
+    pub fn count_stalled_step(&mut self, step: f64, short_step: f64) {
+        let stalls = self.restoration.outer_objective_unit.is_some() || step <= short_step;
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
@@ -201,9 +194,10 @@ impl<'c> RunState<'c> {
     /// Stores the error of an iterate, and counts iterations in which complementarity stalls: with
     /// the smallest `μ`, and all other residuals below the tolerance.
     pub fn update_nlp_error(&mut self, error: f64, error_without_complementarity: f64, options: &IpmOptions) {
-        let tolerance = options.tolerance;
-        let is_min_mu = self.mu <= 2.0 * barrier::min_mu(options.product_tolerance(self.product_unit));
-        let is_stalled = error > tolerance.max(STALLED_COMPLEMENTARITY_RATIO * self.nlp_error);
+        let (tolerance, barrier) = (options.tolerance, &options.advanced.barrier);
+        let min_mu = barrier.min_mu(options.product_tolerance(self.product_unit));
+        let is_min_mu = self.mu <= 2.0 * min_mu;
+        let is_stalled = error > tolerance.max(barrier.stalled_complementarity_ratio * self.nlp_error);
         self.complementarity_stall_iterations =
             if is_min_mu && error_without_complementarity <= tolerance && is_stalled {
                 self.complementarity_stall_iterations + 1
@@ -214,10 +208,9 @@ impl<'c> RunState<'c> {
     }
 
     /// Whether complementarity stalls; true at most once in a run.
-    pub fn is_complementarity_stalled(&mut self) -> bool {
-        let is_complementarity_stalled = self.complementarity_stall_iterations
-            >= COMPLEMENTARITY_STALL_ITERATIONS
-            && !self.has_reset_slacks;
+    pub fn is_complementarity_stalled(&mut self, stall_iterations: usize) -> bool {
+        let is_complementarity_stalled =
+            self.complementarity_stall_iterations >= stall_iterations && !self.has_reset_slacks;
         self.has_reset_slacks |= is_complementarity_stalled;
         is_complementarity_stalled
     }
@@ -225,9 +218,9 @@ impl<'c> RunState<'c> {
     /// Starts monotone mode for the rest of the run; slacks, multipliers and filter are initialised
     /// again.
     pub fn begin_monotone_mode(&mut self, options: &IpmOptions) {
-        self.adaptive_mu = AdaptiveMu::new(Barrier::Monotone);
+        self.adaptive_mu = AdaptiveMu::new(Barrier::Monotone, options.advanced.barrier);
         self.mu = options.scaled_start_mu(self.dimensions.scaling.objective_unit);
-        self.regularisation = Regularisation::default();
+        self.regularisation = self.regularisation.restarted();
         (self.slacks_are_current, self.filter_is_initialised) = (false, false);
     }
 }

@@ -1,18 +1,10 @@
 //! Violations in the restoration phase, and their stationarity.
 
 use crate::ocp::assembly::units::ScalingUnits;
+use crate::ocp::nlp::advanced::RestorationOptions;
 use crate::qp::interior::{Iterate, at};
 use crate::qp::{StageOffsetsIter, part};
 use crate::scalar::Real;
-
-/// Violations and gaps, in units, up to which the restoration phase ends.
-pub(super) const SMALL_VIOLATION: f64 = 1e-4;
-/// Violations are stationary if, to first order, no step reduces them by more than this fraction.
-const STATIONARY_DECREASE_RATIO: f64 = 1e-4;
-/// Gaps relative to violations up to which violations may be stationary.
-const CLOSED_GAP_RATIO: f64 = 1e-5;
-/// The largest number of restoration phases in a run.
-pub(super) const MAX_RESTORATION_PHASES: usize = 4;
 
 /// Violations at an iterate, in units.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,8 +31,8 @@ pub(in crate::ocp::nlp) struct RestorationPhase {
 
 impl RestorationPhase {
     /// Whether another restoration phase may start.
-    pub fn may_enter(&self) -> bool {
-        self.outer_objective_unit.is_none() && self.phase_count < MAX_RESTORATION_PHASES
+    pub fn may_enter(&self, options: &RestorationOptions) -> bool {
+        self.outer_objective_unit.is_none() && self.phase_count < options.max_restoration_phases
     }
 
     /// Computes the violations at an iterate with multipliers `π` of the dynamics.
@@ -85,13 +77,15 @@ impl RestorationPhase {
 
 impl Violations {
     /// Whether the run may leave the restoration phase.
-    pub fn are_small(&self) -> bool {
-        self.violation_sum <= SMALL_VIOLATION && self.largest_gap <= SMALL_VIOLATION
+    pub fn are_small(&self, options: &RestorationOptions) -> bool {
+        self.violation_sum <= options.small_violation && self.largest_gap <= options.small_violation
     }
 
     /// Whether the violations are stationary.
-    pub fn is_stationary(&self) -> bool {
+    pub fn is_stationary(&self, options: &RestorationOptions) -> bool {
         let Self { violation_sum: sum, max_first_order_decrease: better, largest_gap: gaps } = *self;
-        sum > SMALL_VIOLATION && better <= STATIONARY_DECREASE_RATIO * sum && gaps <= CLOSED_GAP_RATIO * sum
+        sum > options.small_violation
+            && better <= options.stationary_decrease_ratio * sum
+            && gaps <= options.closed_gap_ratio * sum
     }
 }

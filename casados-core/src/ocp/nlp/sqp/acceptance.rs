@@ -1,7 +1,8 @@
 //! Acceptance of trial points by merit function or filter.
 
 use super::options::Globalisation;
-use crate::ocp::nlp::filter::{ETA_PHI, Filter, FilterPair, switching_condition_holds};
+use crate::ocp::nlp::advanced::FilterOptions;
+use crate::ocp::nlp::filter::{Filter, FilterPair};
 
 /// State of the line search, kept between iterations.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +38,9 @@ impl MeritModel {
 }
 
 impl LineSearchState {
-    pub fn new() -> Self {
-        Self { filter: Filter::new(f64::INFINITY), last_step_was_full: true, linearisation_seconds: None }
+    pub fn new(filter: FilterOptions) -> Self {
+        let filter = Filter::new(filter, f64::INFINITY);
+        Self { filter, last_step_was_full: true, linearisation_seconds: None }
     }
 
     /// Whether the point at this step length is acceptable.
@@ -53,19 +55,19 @@ impl LineSearchState {
         if !trial_pair.is_finite() {
             return false;
         }
-        let noise = model.rounding_noise();
+        let (noise, eta_phi) = (model.rounding_noise(), self.filter.options.eta_phi);
         match globalisation {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;
-                trial_pair.merit() <= here.merit() + ETA_PHI * length * slope.min(0.0) + noise
+                trial_pair.merit() <= here.merit() + eta_phi * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 if !self.filter.is_acceptable(trial_pair, noise) {
                     return false;
                 }
-                if switching_condition_holds(length, *slope, here.violation) {
-                    return trial_pair.objective <= here.objective + ETA_PHI * length * slope + noise;
+                if self.filter.options.switching_condition_holds(length, *slope, here.violation) {
+                    return trial_pair.objective <= here.objective + eta_phi * length * slope + noise;
                 }
                 self.filter.augment_if_improved(trial_pair, here, noise)
             }

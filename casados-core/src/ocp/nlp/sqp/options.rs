@@ -1,6 +1,7 @@
 //! Options of sequential quadratic programming.
 
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::nlp::advanced::AdvancedSqpOptions;
 
 /// The choice of the step length.
 ///
@@ -88,6 +89,8 @@ pub struct SqpOptions {
     /// guess, or with perturbed controls if the violations are still those of the guess. Default
     /// true.
     pub restart: bool,
+    /// The constants of the algorithm.
+    pub advanced: AdvancedSqpOptions,
 }
 
 impl SqpOptions {
@@ -107,6 +110,7 @@ impl SqpOptions {
             max_qp_iterations: 100,
             perturb_start: true,
             restart: true,
+            advanced: AdvancedSqpOptions::DEFAULT,
         }
     }
 
@@ -129,6 +133,6 @@ impl SqpOptions {
             let (name, value) = ("max_qp_iterations", self.max_qp_iterations as f64);
             return Err(OcpError::InvalidOption { name, value, allowed: "at least 4" });
         }
-        Ok(())
+        self.advanced.validate()
     }
 }

@@ -6,9 +6,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::ocp::nlp::simulation::{
-    GUESS_VIOLATION_RATIO, MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, RestartPoint,
-};
+use crate::ocp::nlp::simulation::RestartPoint;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, SolutionStageMut, StageDims, copy_common, nan_max};
@@ -38,7 +36,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             final_status,
             Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_))
         );
-        let stalls = final_status.is_none() && state.elastic_steps == RESTART_AFTER;
+        let stalls =
+            final_status.is_none() && state.elastic_steps == self.options.advanced.restart.restart_after;
         let may_restart = C::EXACT
             && self.options.restart
             && state.contradictory_bounds.is_none()
@@ -52,19 +51,24 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         self.leave_elastic_mode(ocp, state);
+        let restart = self.options.advanced.restart;
         let current_violation = primal_infeasibility(&log_row.residuals);
         let mut simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::Simulation);
         let is_infeasible = matches!(final_status, Some(Status::Infeasible { .. }));
         let guess_violation_range =
-            RESTART_GAIN * current_violation..=GUESS_VIOLATION_RATIO * current_violation;
+            restart.restart_gain * current_violation..=restart.guess_violation_ratio * current_violation;
         if is_infeasible
             && simulated_violation.is_some_and(|violation| guess_violation_range.contains(&violation))
         {
             // A guess whose violations did not decrease may be a maximum of them.
-            simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::PerturbedSimulation);
+            simulated_violation = self.linearise_simulated_guess(
+                ocp,
+                RestartPoint::PerturbedSimulation(self.options.advanced.start),
+            );
         }
         if stalls
-            && !simulated_violation.is_some_and(|violation| violation < RESTART_GAIN * current_violation)
+            && !simulated_violation
+                .is_some_and(|violation| violation < restart.restart_gain * current_violation)
         {
             if simulated_violation.is_some() {
                 ocp.iterate.copy_from(&self.trial_point);
@@ -73,7 +77,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         simulated_violation = simulated_violation
-            .filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.guess_violation);
+            .filter(|&violation| violation <= restart.max_simulated_violation * state.guess_violation);
         if simulated_violation.is_none() {
             ocp.iterate.copy_from(&self.violation_weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -83,7 +87,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Closes the gaps of the last iterate by a simulation with its controls, at most
-    /// `MAX_SIMULATIONS` times in a run, if the violation decreases to `RESTART_GAIN`: gaps over
+    /// `MAX_SIMULATIONS` times in a run, if the violation decreases to `restart_gain`: gaps over
     /// unstable dynamics may leave no QP that is solved. Returns whether the run continues there.
     fn simulate_iterate<P: Program<T>>(
         &mut self,
@@ -112,7 +116,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let is_finite = ocp.simulate_guess(&mut self.trial_point, ends, RestartPoint::Simulation)
             && ocp.linearise(self.curvature).is_ok();
         let violation = if is_finite { primal_infeasibility(&ocp.residuals().0) } else { f64::INFINITY };
-        if violation < RESTART_GAIN * current_violation {
+        if violation < self.options.advanced.restart.restart_gain * current_violation {
             self.continue_from_restart(ocp, state);
             return true;
         }
@@ -131,7 +135,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // The best iterate of all attempts is kept.
         let &mut RunState { scaling: sizes, best_residual, best_iteration, simulations, .. } = state;
         let over = state.deadline_passed.take();
-        let fresh_state = RunState { best_residual, best_iteration, simulations, ..RunState::new() };
+        let fresh_state =
+            RunState { best_residual, best_iteration, simulations, ..RunState::new(&self.options) };
         *state = RunState {
             deadline_passed: over,
             second_attempt: true,

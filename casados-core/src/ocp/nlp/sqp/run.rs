@@ -115,7 +115,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut state = RunState {
             deadline_passed: Some(deadline_passed),
             contradictory_bounds: contradiction,
-            ..RunState::new()
+            ..RunState::new(&self.options)
         };
         // Solutions of QPs satisfy the coupling; so must the first iterate.
         ocp.equalise_shared_controls();
@@ -200,7 +200,7 @@ where
             None if log_row.iteration == 0 => {
                 let curvature = self.curvature;
                 let linearise = |ocp: &mut Ocp<P, T, D, M>| ocp.linearise(curvature);
-                let may_perturb = self.options.perturb_start;
+                let may_perturb = self.options.perturb_start.then_some(self.options.advanced.start);
                 log_row.perturbed = ocp.linearise_guess(linearise, &mut self.trial_point, may_perturb)?;
                 if log_row.perturbed {
                     self.violation_weights.copy_from(&ocp.iterate);

@@ -101,16 +101,17 @@ const MAX_DAMPING: f64 = 1e2;
 
 impl<T> RunState<'_, T> {
     /// The state at the start of a run.
-    pub fn new() -> Self {
+    pub fn new(options: &SqpOptions) -> Self {
+        let advanced = &options.advanced;
         Self {
             deadline_passed: None,
             out_of_time: false,
             is_run_start: true,
             second_attempt: false,
             simulations: 0,
-            line_search: LineSearchState::new(),
+            line_search: LineSearchState::new(advanced.filter),
             is_elastic: false,
-            inertia_correction: InertiaCorrection::default(),
+            inertia_correction: InertiaCorrection::new(advanced.inertia),
             damping: 0.0,
             failed_damping: 0.0,
             may_reject_short_steps: false,

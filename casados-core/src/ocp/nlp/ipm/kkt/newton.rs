@@ -6,6 +6,7 @@
 use super::dimensions::{KktDimensions, reading_options};
 use super::workspace::Workspace;
 use crate::ocp::assembly::units::ProblemScaling;
+use crate::ocp::nlp::advanced::NewtonOptions;
 use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
 use crate::qp::{
     QpError, QpField, QpView, Residuals, SolutionView, StageOffsetsIter, Store, copy_common, take_mut,
@@ -187,11 +188,6 @@ impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
     }
 }
 
-/// The largest number of refinements with the same factors.
-const MAX_REFINEMENTS: usize = 3;
-/// Refinement continues while it leaves at most this fraction of the residual of the equations.
-const REFINEMENT_GAIN: f64 = 0.5;
-
 /// Iterative refinement: removes the dual regularisation of equations from the step, up to a
 /// residual of `ε^(2/3)`, with the same factors. Each solve starts from the last multipliers
 /// (proximal method of multipliers).
@@ -201,11 +197,12 @@ const REFINEMENT_GAIN: f64 = 0.5;
 pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     units: &[T],
+    options: &NewtonOptions,
 ) -> Result<(), QpError> {
     let mut last_residual = f64::INFINITY;
-    for _ in 0..MAX_REFINEMENTS {
-        let residual = largest_equation_residual(iterate, units);
-        if !(residual > 0.0 && residual <= REFINEMENT_GAIN * last_residual) {
+    for _ in 0..options.max_refinement_steps {
+        let residual = largest_equation_residual(iterate, units, options);
+        if !(residual > 0.0 && residual <= options.residual_improvement_factor * last_residual) {
             break;
         }
         last_residual = residual;
@@ -217,8 +214,8 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
 }
 
 /// The residual at which refinement stops, `ε^(2/3)` of the value and unit of an equation.
-fn refined_equation_residual<T: Real>() -> f64 {
-    Scalar::powf(T::EPSILON, 2.0 / 3.0)
+fn refined_equation_residual<T: Real>(options: &NewtonOptions) -> f64 {
+    Scalar::powf(T::EPSILON, options.residual_exponent)
 }
 
 /// Returns the residuals that refinement leaves in equations: as a fraction of their values, and as
@@ -226,18 +223,19 @@ fn refined_equation_residual<T: Real>() -> f64 {
 pub(in crate::ocp::nlp::ipm) fn equation_residuals_after_step<T: Real>(
     iterate: &Iterate<'_, T>,
     units: &[T],
+    options: &NewtonOptions,
 ) -> (f64, f64) {
     let rows = &*iterate.inequalities.equations;
-    let residual = if rows.is_empty() { 0.0 } else { refined_equation_residual::<T>() };
+    let residual = if rows.is_empty() { 0.0 } else { refined_equation_residual::<T>(options) };
     let sizes = rows.iter().map(|&row| 1.0 + (at(iterate.v, row) / at(units, row)).abs().to_f64());
     (residual, residual * sizes.sum::<f64>())
 }
 
 /// The largest residual of an equation after the full step, in units; zero if refinement
 /// stops.
-fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
+fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T], options: &NewtonOptions) -> f64 {
     let inequalities = &iterate.inequalities;
-    let rounding = refined_equation_residual::<T>();
+    let rounding = refined_equation_residual::<T>(options);
     let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
     let remaining_residuals = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
@@ -300,23 +298,20 @@ impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
     }
 }
 
-/// The weight of the identity that replaces the Hessian in [`least_squares_multipliers`], in units
-/// of the objective.
-const IDENTITY_HESSIAN_WEIGHT: f64 = 1e8;
-
 /// Computes least-squares multipliers, which minimise the gradient of the Lagrangian: `π` into
 /// `work.next_costates`, those of general constraints into `work.hessian_multipliers`. The
-/// multipliers of bounds of variables are given. Solves Newton's equations with a large multiple of
-/// the identity as Hessian, and without constraint residuals (Wächter and Biegler, section 3.6).
+/// multipliers of bounds of variables are given. Solves Newton's equations with a large multiple,
+/// `identity`, of the identity as Hessian, and without constraint residuals (Wächter and Biegler,
+/// section 3.6).
 ///
 /// # Errors
 /// The errors of the recursion.
 pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Workspace<'_, T>,
-    objective_unit: f64,
+    identity: f64,
 ) -> Result<(), QpError> {
-    let identity = T::from_f64(IDENTITY_HESSIAN_WEIGHT * objective_unit);
+    let identity = T::from_f64(identity);
     copy_common(work.trial_slacks, iterate.inequalities.multiplier);
     set_general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());

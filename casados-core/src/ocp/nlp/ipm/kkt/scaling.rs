@@ -3,14 +3,10 @@
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), equations (5) and (6).
 
 use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ScalingUnits, tolerance_factor};
+use crate::ocp::nlp::advanced::NewtonOptions;
 use crate::qp::interior::{Inequalities, Iterate, at};
 use crate::qp::{Residuals, StageDims, StageOffsetsIter, nan_max, part};
 use crate::scalar::Real;
-
-/// The unit of a state's gap is at least this fraction of the state.
-const MIN_RELATIVE_GAP_UNIT: f64 = 1e-5;
-/// `s_max`: a larger mean of the multipliers scales residuals down.
-const S_MAX: f64 = 100.0;
 
 /// Returns the gaps of the dynamics, each with the unit of its state.
 pub(in crate::ocp::nlp::ipm) fn gaps_with_units<'a, T: Real>(
@@ -57,6 +53,7 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     pi: &[T],
     (units, product_unit): (ScalingUnits<'_, T>, f64),
     stage_residual: f64,
+    options: &NewtonOptions,
 ) -> ScaledResiduals {
     let (force, units) = (units.scaling.objective_unit, units.rows);
     let (inequalities, dims) = (&iterate.inequalities, iterate.qp.dims);
@@ -78,7 +75,8 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
         .fold((inequality_multiplier_sum + equation_multiplier_sum, 0), |(sum, count), pair| {
             (size(sum, pair), count + 1)
         });
-    let mean = |sum: f64, count: usize, unit: f64| (sum / unit / count.max(1) as f64 / S_MAX).max(1.0);
+    let mean =
+        |sum: f64, count: usize, unit: f64| (sum / unit / count.max(1) as f64 / options.s_max).max(1.0);
     let pairs = inequalities.counts.pair_count();
     let s_d = mean(all, count + pairs + inequalities.counts.equations, force);
     let [s_c, tolerance_s_c] = [force, product_unit].map(|unit| mean(inequality_multiplier_sum, pairs, unit));
@@ -91,7 +89,7 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     }
     let barrier = Residuals {
         stationarity: barrier_stationarity.to_f64() / (force * s_d),
-        dynamics: nan_max(largest_scaled_gap(iterate, units), stage_residual),
+        dynamics: nan_max(largest_scaled_gap(iterate, units, options.min_relative_gap_unit), stage_residual),
         inequalities: largest_scaled_inequality(inequalities, units, |unit| unit),
         complementarity: residuals.complementarity / (force * s_c),
     };
@@ -111,9 +109,9 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
 }
 
 /// Returns the largest gap in units of the states, which are at most one and at least
-/// [`MIN_RELATIVE_GAP_UNIT`] of the state.
-fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
-    let rounding = T::from_f64(MIN_RELATIVE_GAP_UNIT);
+/// `min_relative_unit` of the state.
+fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T], min_relative_unit: f64) -> f64 {
+    let rounding = T::from_f64(min_relative_unit);
     let coupling = iterate
         .coupling
         .as_ref()

@@ -5,18 +5,10 @@ use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic_mode::Worst;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::dimensions::KktDimensions;
-use crate::ocp::nlp::ipm::kkt::regularisation::Regularisation;
 use crate::ocp::nlp::ipm::run_state::RunState;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::StageDims;
 use crate::scalar::Real;
-
-/// The largest ratio of penalties to the first ones.
-const MAX_PENALTY_FACTOR: f64 = 1e4;
-/// A violation is stationary if a larger penalty leaves more than this fraction of it.
-const STATIONARY_ELASTIC_RATIO: f64 = 0.9;
-/// The first barrier parameter of elastic mode, in units of the objective.
-const ELASTIC_MU: f64 = 0.1;
 
 /// The largest violation of a hard bound in elastic mode, in units.
 pub(in crate::ocp::nlp::ipm) fn largest_elastic_violation<
@@ -53,17 +45,20 @@ pub(in crate::ocp::nlp::ipm) fn status_at_stationary_point<
     let worst = largest_elastic_violation(ocp, state, (saved_penalties, units))
         .filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic_penalty, worst) else { return Some(Status::Converged) };
-    let is_stationary = worst.violation > STATIONARY_ELASTIC_RATIO * state.last_elastic_violation
+    let restoration = &options.advanced.restoration;
+    let is_stationary = worst.violation > restoration.stationary_elastic_ratio * state.last_elastic_violation
         && penalty_cost >= (ocp.objective.to_f64() - state.initial_objective).abs();
-    if is_stationary || penalty >= MAX_PENALTY_FACTOR * options.elastic_penalty {
+    if is_stationary || penalty >= restoration.max_penalty_factor * options.elastic_penalty {
         return Some(ocp.infeasible_status(&worst));
     }
     state.last_elastic_violation = worst.violation;
-    set_elastic_penalties(ocp, state, (saved_penalties, units), 10.0 * penalty);
+    let penalty = restoration.penalty_inc_fact * penalty;
+    set_elastic_penalties(ocp, state, (saved_penalties, units), (penalty, restoration.elastic_mu));
     None
 }
 
-/// Replaces hard bounds by penalties, in units; slacks are initialised again.
+/// Replaces hard bounds by penalties, in units, and starts with `elastic_mu`; initialises slacks
+/// again.
 pub(in crate::ocp::nlp::ipm) fn set_elastic_penalties<
     P: Program<T>,
     T: Real,
@@ -73,14 +68,14 @@ pub(in crate::ocp::nlp::ipm) fn set_elastic_penalties<
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut RunState<'_>,
     (saved_penalties, units): (&[T], &[T]),
-    penalty: f64,
+    (penalty, elastic_mu): (f64, f64),
 ) {
     let sizes = state.dimensions.scaling;
     ocp.set_penalties(saved_penalties, Some(T::from_f64(penalty * sizes.objective_unit)), units);
     state.dimensions = KktDimensions { scaling: sizes, ..KktDimensions::from_qp(ocp.qp()) };
     state.elastic_penalty = Some(penalty);
     state.slacks_are_current = false;
-    state.mu = ELASTIC_MU * sizes.objective_unit;
-    state.regularisation = Regularisation::default();
+    state.mu = elastic_mu * sizes.objective_unit;
+    state.regularisation = state.regularisation.restarted();
     state.filter_is_initialised = false;
 }

@@ -13,25 +13,18 @@
 use super::elastic_mode::{self, set_elastic_penalties};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
+use crate::ocp::nlp::advanced::RestorationOptions;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::dimensions::KktDimensions;
 use crate::ocp::nlp::ipm::kkt::workspace::Workspace;
 use crate::ocp::nlp::ipm::run_state::RunState;
-use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::nlp::solver_loop::NextAction;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
 use crate::qp::interior::{Inequalities, at};
 use crate::qp::{StageDims, Store};
 use crate::scalar::{Real, Scalar};
-
-/// The ratio of the objective unit in the restoration phase to that of the problem. It makes the
-/// curvature of the objective small.
-const RESTORATION_PENALTY_SCALING: f64 = 1e3;
-/// With violations up to this one, the first recovery is a monotone barrier instead of a
-/// restoration phase.
-const MONOTONE_RETRY_VIOLATION: f64 = 1e-2;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Recovers from a failed step: by a restoration phase, then a monotone barrier, then elastic
@@ -43,29 +36,39 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Option<Status> {
         let workspace = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
         let (penalties, units) = (&*workspace.saved_penalties, &*workspace.units);
+        let options = self.options.advanced.restoration;
         if state.restoration.outer_objective_unit.is_some() {
             if state.adaptive_mu.allows_free_mode() {
                 state.begin_monotone_mode(&self.options);
                 return None;
             }
-            state.restoration.phase_count = MAX_RESTORATION_PHASES;
+            state.restoration.phase_count = options.max_restoration_phases;
             exit_restoration(ocp, state, penalties, &self.options);
             ocp.restore_best_iterate(&self.best_iterate);
-            set_elastic_penalties(ocp, state, (penalties, units), self.options.elastic_penalty);
+            set_elastic_penalties(
+                ocp,
+                state,
+                (penalties, units),
+                (self.options.elastic_penalty, options.elastic_mu),
+            );
             return None;
         }
         // Near a feasible point the first failure is not caused by violations.
         let is_violated = state.violation
-            > if state.adaptive_mu.allows_free_mode() { MONOTONE_RETRY_VIOLATION } else { SMALL_VIOLATION };
+            > if state.adaptive_mu.allows_free_mode() {
+                options.monotone_retry_violation
+            } else {
+                options.small_violation
+            };
         if self.options.elastic
             && state.elastic_penalty.is_none()
             && is_violated
-            && state.restoration.may_enter()
+            && state.restoration.may_enter(&options)
         {
             if state.violation > state.best_violation {
                 ocp.restore_best_iterate(&self.best_iterate);
             }
-            enter_restoration(ocp, state, (penalties, units));
+            enter_restoration(ocp, state, (penalties, units), &options);
             return None;
         }
         if state.adaptive_mu.allows_free_mode() {
@@ -79,7 +82,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         // The last iterate is a poor start.
         ocp.restore_best_iterate(&self.best_iterate);
-        set_elastic_penalties(ocp, state, (penalties, units), self.options.elastic_penalty);
+        set_elastic_penalties(
+            ocp,
+            state,
+            (penalties, units),
+            (self.options.elastic_penalty, options.elastic_mu),
+        );
         None
     }
 }
@@ -89,11 +97,12 @@ fn enter_restoration<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut RunState<'_>,
     penalties_and_units: (&[T], &[T]),
+    options: &RestorationOptions,
 ) {
     state.restoration.outer_objective_unit = Some(state.dimensions.scaling.objective_unit);
     state.restoration.phase_count += 1;
-    state.dimensions.scaling.objective_unit *= RESTORATION_PENALTY_SCALING;
-    set_elastic_penalties(ocp, state, penalties_and_units, 1.0);
+    state.dimensions.scaling.objective_unit *= options.resto_penalty_scaling;
+    set_elastic_penalties(ocp, state, penalties_and_units, (1.0, options.elastic_mu));
     state.dimensions.in_restoration = true;
 }
 
@@ -130,12 +139,13 @@ pub(in crate::ocp::nlp::ipm) fn check_restoration<
     options: &IpmOptions,
 ) -> Option<NextAction> {
     let violations = state.restoration.violations;
-    if violations.is_stationary()
+    let restoration = &options.advanced.restoration;
+    if violations.is_stationary(restoration)
         && let Some(worst) = elastic_mode::largest_elastic_violation(ocp, state, (penalties, units))
     {
         return Some(NextAction::Terminate(ocp.infeasible_status(&worst)));
     }
-    if violations.are_small() || state.nlp_error <= options.tolerance {
+    if violations.are_small(restoration) || state.nlp_error <= options.tolerance {
         exit_restoration(ocp, state, penalties, options);
         return Some(NextAction::Reevaluate);
     }

@@ -8,9 +8,7 @@ use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::workspace::Workspace;
 use crate::ocp::nlp::ipm::run_state::RunState;
 use crate::ocp::nlp::ipm::violations::RestorationPhase;
-use crate::ocp::nlp::simulation::{
-    GUESS_VIOLATION_RATIO, MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, RestartPoint,
-};
+use crate::ocp::nlp::simulation::RestartPoint;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
@@ -30,7 +28,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
-        let stalls = final_status.is_none() && state.stalled_iterations == RESTART_AFTER;
+        let options = self.options.advanced.restart;
+        let stalls = final_status.is_none() && state.stalled_iterations == options.restart_after;
         let failed = matches!(final_status, Some(Status::Infeasible { .. } | Status::NoProgress));
         if !(failed || stalls) || !self.options.restart || state.second_attempt || ocp.problem.is_lifted() {
             return false;
@@ -49,13 +48,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let is_infeasible =
             matches!(final_status, Some(Status::Infeasible { .. })) && state.contradictory_bounds.is_none();
         let mut equals_guess_violation = false;
-        for start in [RestartPoint::Simulation, RestartPoint::PerturbedSimulation] {
+        for start in
+            [RestartPoint::Simulation, RestartPoint::PerturbedSimulation(self.options.advanced.start)]
+        {
             let max_violation_ratio = match start {
-                RestartPoint::Simulation => RESTART_GAIN,
-                RestartPoint::PerturbedSimulation if is_infeasible && equals_guess_violation => {
-                    MAX_SIMULATED_VIOLATION
+                RestartPoint::Simulation => options.restart_gain,
+                RestartPoint::PerturbedSimulation(_) if is_infeasible && equals_guess_violation => {
+                    options.max_simulated_violation
                 }
-                RestartPoint::PerturbedSimulation => break,
+                RestartPoint::PerturbedSimulation(_) => break,
             };
             self.trial_point.copy_from(&self.guess);
             let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
@@ -73,7 +74,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                     (RestorationPhase::default(), true, true);
                 return true;
             }
-            equals_guess_violation = simulated_violation <= GUESS_VIOLATION_RATIO * reference_violation;
+            equals_guess_violation =
+                simulated_violation <= options.guess_violation_ratio * reference_violation;
             core::mem::swap(&mut ocp.iterate, &mut self.trial_point);
             state.is_linearised = false;
         }

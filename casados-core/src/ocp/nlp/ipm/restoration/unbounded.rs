@@ -20,13 +20,7 @@ use crate::ocp::nlp::ipm::run_state::RunState;
 use crate::qp::element::set;
 use crate::qp::interior::at;
 use crate::qp::{StageDims, StageOffsetsIter, Store, part};
-use crate::scalar::Real;
-
-/// The lengths of the tested points of the ray, relative to the size of the variables: up to the
-/// largest numbers, to detect a distant minimum.
-const RAY_LENGTHS: [f64; 10] = [1.0, 1e4, 1e8, 1e12, 1e16, 1e20, 1e24, 1e28, 1e32, 1e36];
-/// After a failed test, the growth of the variables before the next test.
-const RAY_RETRY_GROWTH: f64 = 1e3;
+use crate::scalar::{Real, Scalar};
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Whether variables are very large, and the step is a recession direction.
@@ -40,11 +34,17 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !diverges || state.elastic_penalty.is_some() || state.dimensions.in_restoration {
             return false;
         }
-        state.diverging_iterates_tol *= RAY_RETRY_GROWTH;
+        state.diverging_iterates_tol *= self.options.advanced.unbounded.ray_retry_growth;
         let lengths = state.dimensions;
         let tolerance = self.options.tolerance.max(T::EPSILON);
-        let Self { trial_point: trial, kkt_numbers: numbers, kkt_indices: indices, workspace: work, .. } =
-            self;
+        let Self {
+            trial_point: trial,
+            kkt_numbers: numbers,
+            kkt_indices: indices,
+            workspace: work,
+            options,
+            ..
+        } = self;
         let mut work = Workspace::new(ocp.ends(), &state.max_dimensions, work.as_mut());
         let mut ray = LineSearch {
             dimensions: &lengths,
@@ -52,6 +52,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             kkt_indices: indices,
             trial_point: trial,
             workspace: &mut work,
+            options: &options.advanced,
         };
         let unbounded = ray.is_recession_direction(ocp, tolerance);
         ocp.step_length = Some(T::ZERO);
@@ -74,8 +75,9 @@ where
         let Some(mut last_objective) = self.objective_on_ray(ocp, 0.0, tolerance * size) else {
             return false;
         };
-        let mut accepted_points = 0;
-        for length in RAY_LENGTHS {
+        let (mut accepted_points, options) = (0, self.options.unbounded);
+        for point in 0..options.ray_points {
+            let length = Scalar::powf(options.ray_length_ratio, point as f64);
             let Some(objective) = self.objective_on_ray(ocp, length * size / step, tolerance) else {
                 return false;
             };
