@@ -233,11 +233,8 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisit
         let VelocityRows { plan, jacobian, minus_ha, rows, sum } = &mut self.0;
         let Some(kinematic) = plan.structure().elimination.dependents.get(index).in_bounds() else { return };
         let Some((slot, values, derivative)) = dependent_entry(*plan, kinematic, jacobian) else { return };
-        let (Some(&own), Some(&row)) =
-            (rows.get(kinematic.state as usize).in_bounds(), rows.get(slot).in_bounds())
-        else {
-            return;
-        };
+        let Some(&own) = rows.get(kinematic.state as usize).in_bounds() else { return };
+        let Some(&row) = rows.get(slot).in_bounds() else { return };
         let (mut own_row, mut row) = (own, row);
         if kinematic.first {
             *sum = [[E::from_f64(0.0); W]; S];
@@ -371,9 +368,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, c
         let mut panel_row = [[E::from_f64(0.0); W]; S];
         match (forward.plan.velocity(kinematic), minus_c(kinematic, forward.jacobian)) {
             (Some(velocity), Some(minus_c)) => {
-                if let (Some(v), Some(dk)) =
-                    (forward.v.get(velocity).in_bounds(), rows.get(velocity).in_bounds())
-                {
+                if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity).in_bounds()) {
                     panel_row = [*v; S];
                     subtract_product::<A, E, S, W>(&mut panel_row, minus_ha, dk);
                 }
