@@ -3,8 +3,10 @@
 //! Stable Rust has no `[T; M::NX]` in generic code. So the dimensions of a model are a type,
 //! [`Dims`], and [`Shape`] maps an element type to the arrays and matrices of these dimensions.
 
+mod in_bounds;
 mod outputs;
 
+pub(crate) use in_bounds::InBounds;
 pub use outputs::{Count, Outputs};
 
 use bytemuck::Zeroable;

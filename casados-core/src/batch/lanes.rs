@@ -3,7 +3,7 @@
 pub(super) use crate::erk::MaskedResult;
 use crate::linalg::{Arithmetic, Kernel, kernels};
 use crate::scalar::Lanes;
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 use bytemuck::Zeroable;
 
 /// Upper bound of the lanes of a register.
@@ -50,7 +50,7 @@ impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, '_, T, E> {
         let mut whole = from.chunks_exact(E::LANES);
         for from in &mut whole {
             let mut tile: [E::Cell; MAX_LANES] = Zeroable::zeroed();
-            let Some(tile) = tile.get_mut(..E::LANES) else { return };
+            let Some(tile) = tile.get_mut(..E::LANES).in_bounds() else { return };
             E::transpose(from, tile);
             for (to, cell) in to.iter_mut().zip(&*tile) {
                 // The constant length removes bounds checks.

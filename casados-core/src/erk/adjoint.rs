@@ -13,7 +13,7 @@ use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 use bytemuck::Zeroable;
 
 /// The adjoint variables of a step, one column per seed. `R` is a row of maximal length, of which
@@ -93,10 +93,10 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
                 M::adjoint::<UnitStride<E>>(&point.v, &mu, gradient);
                 // The derivative with respect to `ẋ` is a multiple of `μ_i`, which is not used.
                 let nx = M::Shape::NX;
-                let used = gradient.as_ref().as_flattened().get(nx..).unwrap_or_default();
+                let used = gradient.as_ref().as_flattened().get(nx..).in_bounds().unwrap_or_default();
                 point.check(used, Quantity::Adjoint, at, |variable| nx + variable)?;
                 integrand.add_gradient(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
-                if let Some(xibar) = dk.get_mut(stage) {
+                if let Some(xibar) = dk.get_mut(stage).in_bounds() {
                     keep::<M, E, R>(&*gradient, xibar, lambda);
                 }
                 if let Some(multipliers) = &mut multipliers {
@@ -104,7 +104,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
                 }
             } else {
                 point.jacobian(jacobian, at)?;
-                if let Some(xibar) = dk.get_mut(stage) {
+                if let Some(xibar) = dk.get_mut(stage).in_bounds() {
                     pull::<M, E, R, S>(scheme, &*jacobian, &*dxi, columns, (xibar, lambda));
                 }
             }
@@ -142,7 +142,7 @@ kernels! { by run_plain;
         mu: &'k mut ArrayK<M, [E; 1]>,
     ) {
         for (mu, row) in mu.as_mut().iter_mut().zip(scheme.equations.as_ref()) {
-            let kbar = kbar.as_ref().get(row.state).map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
+            let kbar = kbar.as_ref().get(row.state).in_bounds().map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
             *mu = [row.factor * kbar];
         }
     }
@@ -180,11 +180,11 @@ kernels! { by run_plain;
             let w = variable - nx;
             let sum = if w < nx { xibar.as_mut().get_mut(w) } else { lambda.as_mut().get_mut(w) };
             let (Some(sum), Some(&[value]), Some(row)) =
-                (sum, jacobian.as_ref().get(entry), scheme.equations.as_ref().get(equation))
+                (sum, jacobian.as_ref().get(entry).in_bounds(), scheme.equations.as_ref().get(equation).in_bounds())
             else {
                 continue;
             };
-            if let Some(kbar) = kbar.as_ref().get(row.state) {
+            if let Some(kbar) = kbar.as_ref().get(row.state).in_bounds() {
                 add::<A, E>(row.factor * value, &kbar.as_ref()[..columns], sum.as_mut());
             }
         }

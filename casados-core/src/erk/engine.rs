@@ -14,7 +14,7 @@ use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Field, Lanes};
-use crate::shape::{Array, Matrix, Shape};
+use crate::shape::{Array, InBounds, Matrix, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -242,7 +242,9 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
             workspace.point.counts.steps = 0;
             forward_sweep.integrate(scheme, grid, workspace, variation, true, |point, dxi, at| {
                 let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
-                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
+                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage).in_bounds()) else {
+                    return Ok(());
+                };
                 integrand.add_forward(point.variables(), dxi, [grid.h, b], true, at)?;
                 curvature.add_stage(scheme, point, mu, dxi, at)
             })

@@ -9,7 +9,7 @@ use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Matrix, Shape, copy};
+use crate::shape::{Array, InBounds, Matrix, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -47,7 +47,7 @@ impl<M: Ode, E: Lanes> Directions<M, E> for UnitDirections {
     }
     #[inline(always)]
     fn add_scaled(self, i: usize, coefficient: E, row: &mut [E]) {
-        if let Some(element) = row.get_mut(i) {
+        if let Some(element) = row.get_mut(i).in_bounds() {
             *element = *element + coefficient;
         }
     }
@@ -128,7 +128,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
             self.stage_state(scheme, &grid.h, stage, directions);
             on_stage(point, &self.dxi, at)?;
             let Self { dk, dxi, jacobian, .. } = self;
-            if let Some(dk) = dk.get_mut(stage) {
+            if let Some(dk) = dk.get_mut(stage).in_bounds() {
                 stage_derivative::<M, E, R, _, S>(scheme, jacobian, dxi, directions, dk);
             }
         }
@@ -144,7 +144,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         stage: usize,
         directions: impl Directions<M, E>,
     ) {
-        if let Some(dk) = self.dk.get_mut(stage) {
+        if let Some(dk) = self.dk.get_mut(stage).in_bounds() {
             stage_derivative::<M, E, R, _, S>(scheme, jacobian, &self.dxi, directions, dk);
         }
     }
@@ -205,7 +205,7 @@ kernels! { by run_plain;
             let end = M::STRUCTURE.blocks[2];
             let entries = begin..(begin..end).find(is_other).unwrap_or(end);
             begin = entries.end;
-            let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
+            let Some(dk) = dk.as_mut().get_mut(row.state).in_bounds() else { continue };
             let (factor, dk) = (row.factor, dk.as_mut());
             for_each_tile::<A, _, 4>(0, columns, &mut JacobianRowProduct::<M, E, R> { entries, jacobian, factor, dxi, dk });
         }
@@ -264,11 +264,11 @@ fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>
     for entry in first..M::STRUCTURE.blocks[5] {
         let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
         let (Some(&[value]), Some(row)) =
-            (jacobian.as_ref().get(entry), scheme.equations.as_ref().get(equation))
+            (jacobian.as_ref().get(entry).in_bounds(), scheme.equations.as_ref().get(equation).in_bounds())
         else {
             continue;
         };
-        let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
+        let Some(sum) = dk.as_mut().get_mut(row.state).in_bounds() else { continue };
         let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
         if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
             add::<A, E>(coefficient, dxi.as_ref(), sum);
@@ -317,7 +317,8 @@ impl<M: Ode, E: Lanes, R: Array<E>> ColumnKernel for JacobianRowProduct<'_, M, E
         let mut sum = [E::zeroed(); W];
         for entry in self.entries.clone() {
             let w = M::STRUCTURE.jacobian.at(entry).1 - M::Shape::NX;
-            if let (Some(&[value]), Some(dxi)) = (self.jacobian.as_ref().get(entry), self.dxi.as_ref().get(w))
+            if let (Some(&[value]), Some(dxi)) =
+                (self.jacobian.as_ref().get(entry).in_bounds(), self.dxi.as_ref().get(w).in_bounds())
             {
                 tiles::add::<A, E, W>(&mut sum, self.factor * value, dxi.as_ref(), first);
             }

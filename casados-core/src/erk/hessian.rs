@@ -8,7 +8,7 @@ use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 use bytemuck::Zeroable;
 use core::ops::Range;
 
@@ -157,11 +157,11 @@ impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
         let direction_row = |variable: usize| rows.get(variable).map(|row| row.as_ref());
         let (row, _) = M::STRUCTURE.hessian.at(of_row.start);
         let Some(row) = row.checked_sub(M::Shape::NX) else { return };
-        let Some(previous_row) = product.as_ref().get(row) else { return };
+        let Some(previous_row) = product.as_ref().get(row).in_bounds() else { return };
         let mut sum = tiles::load::<E, W>(previous_row.as_ref(), first);
         for entry in of_row.clone() {
             let (Some((_, column)), Some(&[value])) =
-                (entry_directions::<M>(entry), entries.as_ref().get(entry))
+                (entry_directions::<M>(entry), entries.as_ref().get(entry).in_bounds())
             else {
                 continue;
             };
@@ -173,7 +173,7 @@ impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
             if row == column {
                 continue;
             }
-            let Some(mirrored_row) = product.as_mut().get_mut(column) else { continue };
+            let Some(mirrored_row) = product.as_mut().get_mut(column).in_bounds() else { continue };
             let mut mirrored_sum = tiles::load::<E, W>(mirrored_row.as_ref(), first);
             match direction_row(row) {
                 Some(d) => tiles::add::<A, E, W>(&mut mirrored_sum, value, d, first),
@@ -181,7 +181,7 @@ impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
             }
             tiles::store(&mirrored_sum, mirrored_row.as_mut(), first);
         }
-        if let Some(product) = product.as_mut().get_mut(row) {
+        if let Some(product) = product.as_mut().get_mut(row).in_bounds() {
             tiles::store(&sum, product.as_mut(), first);
         }
     }
@@ -220,7 +220,7 @@ fn add_row<A: Arithmetic, M: Ode, E: Lanes>(
     column: usize,
     dxi: &ArrayX<M, ArrayW<M, E>>,
 ) {
-    let Some(sum) = product.as_mut().get_mut(row) else { return };
+    let Some(sum) = product.as_mut().get_mut(row).in_bounds() else { return };
     if let (true, Some(dxi)) = (column < M::Shape::NX, dxi.as_ref().get(column)) {
         add::<A, E>(value, dxi.as_ref(), sum.as_mut());
     } else if let Some(sum) = sum.as_mut().get_mut(column) {

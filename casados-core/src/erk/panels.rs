@@ -12,7 +12,7 @@ use crate::error::{Error, Place};
 use crate::linalg::{kernels, run_plain};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 use bytemuck::Zeroable;
 
 /// Number of columns of a panel: enough independent products to hide their latency.
@@ -105,7 +105,7 @@ kernels! { by run_plain;
     ) {
         for (to, from) in panel.as_mut().iter_mut().zip(rows.as_ref()) {
             for (i, to) in to.iter_mut().enumerate().take(part.columns) {
-                if let Some(from) = from.as_ref().get(part.first + i) {
+                if let Some(from) = from.as_ref().get(part.first + i).in_bounds() {
                     *to = *from;
                 }
             }
@@ -120,7 +120,7 @@ kernels! { by run_plain;
     ) {
         for (from, to) in panel.as_ref().iter().zip(rows.as_mut()) {
             for (i, from) in from.iter().enumerate().take(part.columns) {
-                if let Some(to) = to.as_mut().get_mut(part.first + i) {
+                if let Some(to) = to.as_mut().get_mut(part.first + i).in_bounds() {
                     *to = *from;
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::model::{ArrayK, ArrayW, Ode};
 use crate::scalar::{Lanes, Scalar};
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
@@ -37,7 +37,7 @@ impl<M: Ode, E: Lanes, const S: usize> Scheme<M, E, S> {
         let mut rows =
             ArrayK::<M, StateEquation<E>>::from_fn(|_| StateEquation { state: 0, factor: E::zeroed() });
         for (state, &(row, coefficient)) in M::ROWS.iter().enumerate() {
-            if let Some(row) = rows.as_mut().get_mut(row as usize) {
+            if let Some(row) = rows.as_mut().get_mut(row as usize).in_bounds() {
                 *row = StateEquation { state, factor: E::from_f64(-1.0 / coefficient) };
             }
         }
@@ -45,7 +45,7 @@ impl<M: Ode, E: Lanes, const S: usize> Scheme<M, E, S> {
         for entry in 0..M::STRUCTURE.hessian.len() {
             let directions = entry_directions::<M>(entry).map(|(row, column)| [row, column]);
             for direction in directions.into_iter().flatten() {
-                if let Some(curved) = is_nonlinear.as_mut().get_mut(direction) {
+                if let Some(curved) = is_nonlinear.as_mut().get_mut(direction).in_bounds() {
                     *curved = true;
                 }
             }

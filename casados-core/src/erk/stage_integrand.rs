@@ -4,7 +4,7 @@ use crate::error::{Error, Place};
 use crate::model::{ArrayV, ArrayW, ArrayX, Ode};
 use crate::quadrature::OptionalIntegrand;
 use crate::scalar::{Lanes, Real};
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 
 /// An optional integrand, evaluated at the stages.
 pub(crate) trait StageIntegrand<M: Ode, E: Lanes> {
@@ -67,12 +67,14 @@ impl<M: Ode, T: Real> StageIntegrand<M, T> for OptionalIntegrand<'_, '_, M, T> {
         copy_variables(v, to);
         for &variable in variables {
             let variable = variable as usize;
-            let (Some(row), Some(w)) = (d.get_mut(variable), variable.checked_sub(nx)) else { continue };
+            let (Some(row), Some(w)) = (d.get_mut(variable).in_bounds(), variable.checked_sub(nx)) else {
+                continue;
+            };
             match dxi.as_ref().get(w) {
                 Some(dxi) => *row = *dxi,
                 None => {
                     row.as_mut().fill(T::ZERO);
-                    if let Some(own) = row.as_mut().get_mut(w) {
+                    if let Some(own) = row.as_mut().get_mut(w).in_bounds() {
                         *own = T::ONE;
                     }
                 }

@@ -8,7 +8,7 @@ use crate::linalg::{Arithmetic, axpy_compensated, dispatch, dot_compensated, ker
 use crate::model::{ArrayK, ArrayV, ArrayX, Ode};
 use crate::result::Nominal;
 use crate::scalar::{Lanes, Strided};
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 use bytemuck::Zeroable;
 
 /// A number or a SIMD register in the arrays of the model, with stride one.
@@ -104,7 +104,7 @@ impl<M: Ode, E: Lanes> StagePoint<M, E> {
         self.check_residual(at)?;
         // The entries of `ẋ`, which come first, are constants in an explicit model.
         let first = M::STRUCTURE.blocks[1];
-        let entries = jacobian.as_ref().as_flattened().get(first..).unwrap_or_default();
+        let entries = jacobian.as_ref().as_flattened().get(first..).in_bounds().unwrap_or_default();
         self.check(entries, Quantity::Jacobian, at, |entry| M::STRUCTURE.jacobian.at(first + entry).0)
     }
 
@@ -178,7 +178,7 @@ kernels! { by run_plain;
         k: &'k mut ArrayX<M, E>,
     ) {
         for (row, &[f]) in scheme.equations.as_ref().iter().zip(f.as_ref()) {
-            if let Some(k) = k.as_mut().get_mut(row.state) {
+            if let Some(k) = k.as_mut().get_mut(row.state).in_bounds() {
                 *k = row.factor * f;
             }
         }

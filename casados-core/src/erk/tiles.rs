@@ -6,6 +6,7 @@
 
 use crate::linalg::Arithmetic;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// An operation on `W` columns at a time; `#[inline(always)]`.
 pub(super) trait ColumnKernel {
@@ -42,7 +43,7 @@ pub(super) fn for_each_tile<A: Arithmetic, V: ColumnKernel, const MAX_WIDTH: usi
 #[inline(always)]
 pub(super) fn load<E: Lanes, const W: usize>(row: &[E], first: usize) -> [E; W] {
     let mut tile = [E::zeroed(); W];
-    if let Some(row) = row.get(first..first + W) {
+    if let Some(row) = row.get(first..first + W).in_bounds() {
         tile.copy_from_slice(row);
     }
     tile
@@ -51,7 +52,7 @@ pub(super) fn load<E: Lanes, const W: usize>(row: &[E], first: usize) -> [E; W] 
 /// Stores columns of a row.
 #[inline(always)]
 pub(super) fn store<E: Lanes, const W: usize>(tile: &[E; W], row: &mut [E], first: usize) {
-    if let Some(row) = row.get_mut(first..first + W) {
+    if let Some(row) = row.get_mut(first..first + W).in_bounds() {
         row.copy_from_slice(tile);
     }
 }
@@ -59,7 +60,7 @@ pub(super) fn store<E: Lanes, const W: usize>(tile: &[E; W], row: &mut [E], firs
 /// `sum + a y`
 #[inline(always)]
 pub(super) fn add<A: Arithmetic, E: Lanes, const W: usize>(sum: &mut [E; W], a: E, y: &[E], first: usize) {
-    if let Some(y) = y.get(first..first + W) {
+    if let Some(y) = y.get(first..first + W).in_bounds() {
         for (sum, &y) in sum.iter_mut().zip(y) {
             *sum = A::add(*sum, a, y);
         }

@@ -19,7 +19,7 @@ use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::quadrature::OptionalIntegrand;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Aligned, Matrix, Plain, Shape};
+use crate::shape::{Aligned, InBounds, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -72,7 +72,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
             self.end_source.as_mut().fill(E::from_f64(0.0));
             self.has_source = true;
         }
-        let source = self.stage_source.as_mut().get_mut(M::Shape::NX..).unwrap_or_default();
+        let source = self.stage_source.as_mut().get_mut(M::Shape::NX..).in_bounds().unwrap_or_default();
         weigh(self.nu.as_slice(), &coefficients.lagrange_start, source);
     }
 
@@ -113,7 +113,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
         if *sourced {
             let (states, inputs) = shift.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
             add_to_all(lambda, states);
-            add_to_all(gradient.get_mut(M::Shape::NX..).unwrap_or_default(), inputs);
+            add_to_all(gradient.get_mut(M::Shape::NX..).in_bounds().unwrap_or_default(), inputs);
         }
     }
 }
@@ -237,7 +237,7 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> RowVisitor for Advance<'
         } else {
             self.gradient.get_mut(c - nx - nz)
         };
-        if let (Some(to), Some(mu)) = (to, self.mu.get(plan.slot(r))) {
+        if let (Some(to), Some(mu)) = (to, self.mu.get(plan.slot(r)).in_bounds()) {
             subtract_stage_products::<A, E, S, C>(to, values, mu);
         }
     }

@@ -20,7 +20,7 @@ use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::{Field, Lanes};
-use crate::shape::{Array, Plain, Shape};
+use crate::shape::{Array, InBounds, Plain, Shape};
 
 /// Bound of the backward error of derivatives, in ε.
 const BACKWARD_ERROR_TOLERANCE: f64 = 4096.0;
@@ -51,7 +51,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             ..
         } = self;
         let (probe, sizes) = (probe.as_mut(), sizes.as_mut());
-        let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
+        let inputs = probe.get_mut(nx + nx + nz..).in_bounds().unwrap_or_default();
         for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
             *input = [directions.weighted_sum(nx + w, with_second_weights); S];
         }
@@ -151,7 +151,8 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for ResidualTest<'_, M, E, S>
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = self.plan.entry(self.jacobian.as_ref(), row) else { return };
-        let (Some(sizes), Some(points)) = (self.magnitudes.as_mut().get_mut(r), self.points.as_ref().get(c))
+        let (Some(sizes), Some(points)) =
+            (self.magnitudes.as_mut().get_mut(r).in_bounds(), self.points.as_ref().get(c).in_bounds())
         else {
             return;
         };
@@ -321,9 +322,12 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for EquationSums<'_, M, E, S>
             equation_magnitudes: terms,
             ..
         } = self;
-        let (Some(sums), Some(terms), Some(probe), Some(sizes)) =
-            (sums.get_mut(r), terms.get_mut(r), probe.get(c), sizes.get(c))
-        else {
+        let (Some(sums), Some(terms), Some(probe), Some(sizes)) = (
+            sums.get_mut(r).in_bounds(),
+            terms.get_mut(r).in_bounds(),
+            probe.get(c).in_bounds(),
+            sizes.get(c).in_bounds(),
+        ) else {
             return;
         };
         // Local copies stay in registers: the optimiser cannot prove that the arguments do not
@@ -374,7 +378,8 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> RowVisitor for VariableS
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = self.plan.entry(self.jacobian, row) else { return };
         let Self { plan, mu, sums, magnitudes: sizes, .. } = self;
-        let (Some(sums), Some(sizes), Some(mu)) = (sums.get_mut(c), sizes.get_mut(c), mu.get(plan.slot(r)))
+        let (Some(sums), Some(sizes), Some(mu)) =
+            (sums.get_mut(c).in_bounds(), sizes.get_mut(c).in_bounds(), mu.get(plan.slot(r)).in_bounds())
         else {
             return;
         };
@@ -410,12 +415,15 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint
         for unknown in 0..nk {
             // For `k`: the entries of `f_ẋ` at its own stage, and those of `f_x` through all `ξ`.
             let variable = if unknown < nx { unknown } else { unknown + nx };
-            let (Some(total), Some(size)) = (sums.get(variable), sizes.get(variable)) else { continue };
+            let (Some(total), Some(size)) = (sums.get(variable).in_bounds(), sizes.get(variable).in_bounds())
+            else {
+                continue;
+            };
             let (mut total, mut size) = (*total, *size);
             if let (true, Some(xi), Some(xi_size)) =
                 (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown))
             {
-                let right = lambda.get(unknown).map_or(zero, |lambda| weighted_seed_sum(lambda));
+                let right = lambda.get(unknown).in_bounds().map_or(zero, |lambda| weighted_seed_sum(lambda));
                 for i in 0..S {
                     let right = h * b[i] * right;
                     total[i] = total[i] - right;

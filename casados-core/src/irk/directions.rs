@@ -9,7 +9,7 @@ use crate::model::{Dae, NO_COLUMN};
 use crate::plan::Plan;
 use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Field, Lanes};
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 
 /// Size of the L1 cache in bytes.
 pub(super) const L1_CACHE_BYTES: usize = 1 << 15;
@@ -135,13 +135,13 @@ pub(super) const fn panel_of<E>(known: bool, column: usize, count: usize, stages
 /// Returns the rows of the panel that begins with `column`, of a matrix with `rows` rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel<E, const W: usize>(panels: &[E], column: usize, rows: usize) -> &[[E; W]] {
-    panels.get(column * rows..(column + W) * rows).unwrap_or_default().as_chunks().0
+    panels.get(column * rows..(column + W) * rows).in_bounds().unwrap_or_default().as_chunks().0
 }
 
 /// Returns the rows of the panel that begins with `column`, of a matrix with `rows` rows.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows: usize) -> &mut [[E; W]] {
-    panels.get_mut(column * rows..(column + W) * rows).unwrap_or_default().as_chunks_mut().0
+    panels.get_mut(column * rows..(column + W) * rows).in_bounds().unwrap_or_default().as_chunks_mut().0
 }
 
 /// The dependence of the directions on `w`.

@@ -21,7 +21,7 @@ use crate::model::{Dae, VectorU, VectorX, VectorZ};
 use crate::quadrature::Integrand;
 use crate::result::Hessian;
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::{InBounds, Matrix, Shape};
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Copies the variables at a stage from `points` to the input of the integrand.
@@ -31,7 +31,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         integrand: &'a mut dyn Integrand<M, T>,
     ) -> &'a mut dyn Integrand<M, T> {
         for (to, from) in integrand.stage_variables_mut().0.iter_mut().zip(self.points.as_ref()) {
-            if let Some(from) = from.get(stage) {
+            if let Some(from) = from.get(stage).in_bounds() {
                 *to = *from;
             }
         }
@@ -78,7 +78,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         for (stage, (b, a)) in coefficients.b.iter().zip(&coefficients.a).enumerate() {
             let at = Place { step: n, stage, iteration: 0 };
             let gradient = self.load_stage(stage, integrand).weighted_gradient(h * *b, at)?;
-            let states = gradient.get(nx..2 * nx).unwrap_or_default();
+            let states = gradient.get(nx..2 * nx).in_bounds().unwrap_or_default();
             for (source, g) in stage_source.iter_mut().zip(states) {
                 for (source, a) in source.iter_mut().zip(a) {
                     *source = *source + h * *a * *g;

@@ -15,6 +15,7 @@ use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::options::Options;
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
+use crate::shape::InBounds;
 use crate::statistics::Statistics;
 use crate::tableau::{Custom, Method, Tableau};
 use core::marker::PhantomData;
@@ -273,7 +274,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let work = last.workspace;
         let point = StepPoint::new(t, &work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
         let h = work.last_inputs.time.step;
-        if let Some(step) = last.steps.get(point.step) {
+        if let Some(step) = last.steps.get(point.step).in_bounds() {
             point.evaluate(step, h, &mut work.dense_output)?;
         }
         Ok(&work.dense_output)

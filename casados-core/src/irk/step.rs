@@ -14,7 +14,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Matrix, Shape, copy_into};
+use crate::shape::{InBounds, Matrix, Shape, copy_into};
 use crate::statistics::Statistics;
 
 /// The method, the options and the initial guess for an interval.
@@ -233,7 +233,7 @@ pub(crate) fn interpolate_algebraic<M: Dae, E: Lanes, const S: usize>(
     y: &ArrayK<M, [E; S]>,
     lagrange: &[E; S],
 ) {
-    let y = y.as_ref().get(M::Shape::NX..).unwrap_or_default();
+    let y = y.as_ref().get(M::Shape::NX..).in_bounds().unwrap_or_default();
     combine(z, y, lagrange);
 }
 

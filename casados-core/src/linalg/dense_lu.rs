@@ -6,7 +6,7 @@
 use super::kernel::vector::{axpy, divide};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Plain, copy};
+use crate::shape::{Array, InBounds, Plain, copy};
 use bytemuck::Zeroable;
 
 /// A matrix over the unknowns of all stages; after [`DenseLu::factor`] its factors.
@@ -36,7 +36,7 @@ impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
     #[inline(always)]
     pub fn add(&mut self, equation: usize, unknown: usize, stage: usize, value: T) {
         if let Some(block) = self.block(equation, unknown, stage)
-            && let Some(element) = block.get_mut(stage)
+            && let Some(element) = block.get_mut(stage).in_bounds()
         {
             *element = *element + value;
         }
@@ -111,7 +111,7 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
     for (k, pivot_row) in pivots.iter_mut().enumerate() {
         let (mut best, mut pivot_index) = (T::ZERO, k);
         for (i, row) in rows.chunks_exact(n).enumerate().skip(k) {
-            let size = row.get(k).map_or(T::ZERO, |element| element.abs());
+            let size = row.get(k).in_bounds().map_or(T::ZERO, |element| element.abs());
             if size > best {
                 (best, pivot_index) = (size, i);
             }
@@ -121,12 +121,14 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
         *pivot_row = pivot_index as u32;
         let Some((upper, lower)) = rows.split_at_mut_checked((k + 1) * n) else { return Err(k) };
         let Some((above, row)) = upper.split_at_checked(k * n) else { return Err(k) };
-        let Some((&pivot, row_after)) = row.get(k..).and_then(|row| row.split_first()) else { return Err(k) };
+        let Some((&pivot, row_after)) = row.get(k..).in_bounds().and_then(|row| row.split_first()) else {
+            return Err(k);
+        };
         let singular = !(best > T::ZERO && pivot.is_finite())
             || best * best < T::from_f64(T::EPSILON) && {
                 let mut sum = T::ZERO;
                 for (above, l) in above.chunks_exact(n).zip(row) {
-                    sum = sum + (*l * above.get(k).copied().unwrap_or(T::ZERO)).abs();
+                    sum = sum + (*l * above.get(k).in_bounds().copied().unwrap_or(T::ZERO)).abs();
                 }
                 pivot.abs() <= T::from_whole(n) * T::from_f64(T::EPSILON) * sum
             };
@@ -134,7 +136,10 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
             return Err(k);
         }
         for lower in lower.chunks_exact_mut(n) {
-            let Some((l, after)) = lower.get_mut(k..).and_then(|row| row.split_first_mut()) else { continue };
+            let Some((l, after)) = lower.get_mut(k..).in_bounds().and_then(|row| row.split_first_mut())
+            else {
+                continue;
+            };
             *l = *l / pivot;
             if *l != T::ZERO {
                 axpy(-*l, row_after, after);
@@ -179,7 +184,7 @@ impl<E: Lanes> LuFactors<'_, E> {
         self.scale(b, width);
         for (i, row) in self.rows.chunks_exact(n).enumerate() {
             let Some((before, here)) = b.split_at_mut_checked(i * width) else { return };
-            let Some(here) = here.get_mut(..width) else { return };
+            let Some(here) = here.get_mut(..width).in_bounds() else { return };
             for (l, x) in row.iter().zip(before.chunks_exact(width)) {
                 if *l != zero {
                     axpy(-*l, x, here);
@@ -188,9 +193,10 @@ impl<E: Lanes> LuFactors<'_, E> {
         }
         for (i, row) in self.rows.chunks_exact(n).enumerate().rev() {
             let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
-            let (Some(current), Some((pivot, row))) =
-                (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
-            else {
+            let (Some(current), Some((pivot, row))) = (
+                here.get_mut(i * width..).in_bounds(),
+                row.get(i..).in_bounds().and_then(|row| row.split_first()),
+            ) else {
                 return;
             };
             for (u, x) in row.iter().zip(after.chunks_exact(width)) {
@@ -221,9 +227,10 @@ impl<E: Lanes> LuFactors<'_, E> {
         }
         for (i, row) in self.rows.chunks_exact(n).enumerate() {
             let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
-            let (Some(current), Some((pivot, row))) =
-                (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
-            else {
+            let (Some(current), Some((pivot, row))) = (
+                here.get_mut(i * width..).in_bounds(),
+                row.get(i..).in_bounds().and_then(|row| row.split_first()),
+            ) else {
                 return;
             };
             divide(current, *pivot);
@@ -235,7 +242,7 @@ impl<E: Lanes> LuFactors<'_, E> {
         }
         for (i, row) in self.rows.chunks_exact(n).enumerate().rev() {
             let Some((before, here)) = b.split_at_mut_checked(i * width) else { return };
-            let Some(here) = here.get(..width) else { return };
+            let Some(here) = here.get(..width).in_bounds() else { return };
             for (l, x) in row.iter().zip(before.chunks_exact_mut(width)) {
                 if *l != zero {
                     axpy(-*l, here, x);

@@ -12,7 +12,7 @@ use crate::memory::{Fallback, OptionalPlace, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
 use crate::plan::{self, Known, Plan, PlanOf, StructureTable};
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Aligned, Array, Plain, Shape, copy_into};
+use crate::shape::{Aligned, Array, InBounds, Plain, Shape, copy_into};
 use bytemuck::Zeroable;
 
 /// Returns the row of an equation in right-hand sides: that of the unknown whose pivot it is.
@@ -150,11 +150,11 @@ impl<M: Plan, E: Field + Plain, const S: usize> RowVisitor for AssemblyRows<'_, 
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Self { plan, jacobian, blocks, .. } = self;
-        let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
+        let Some(entry) = plan.structure().elimination.assembly.get(row).in_bounds() else { return };
         if const { factor::begins_with_update::<M, E>() } && entry.is_fill() {
             return;
         }
-        let Some(to) = blocks.get_mut(entry.block as usize) else { return };
+        let Some(to) = blocks.get_mut(entry.block as usize).in_bounds() else { return };
         let mut block = if entry.first { [[E::from_f64(0.0); S]; S] } else { *to };
         // Absent entries have an index outside of the Jacobian.
         if let Some(&(mut values)) = jacobian.get(entry.entry as usize) {

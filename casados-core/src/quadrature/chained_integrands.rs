@@ -5,7 +5,7 @@ use crate::error::{Error, Place};
 use crate::linalg::axpy;
 use crate::model::{ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 
 /// Converts derivatives by `(x_n, u, p)` to derivatives by `(x₀, u, p)`: `D_i V_n`.
 pub(crate) struct ChainRuleIntegrand<'a, M: Dae, T: Real> {
@@ -39,7 +39,7 @@ impl<M: Dae, T: Real> Integrand<M, T> for ChainRuleIntegrand<'_, M, T> {
         let variables = self.inner.variables();
         let (_, rows) = self.inner.stage_variables_mut();
         for variable in variables {
-            let Some(row) = rows.get_mut(*variable as usize) else { continue };
+            let Some(row) = rows.get_mut(*variable as usize).in_bounds() else { continue };
             let mut sum = ArrayW::<M, T>::from_fn(|w| if w < nx { T::ZERO } else { row[w] });
             for (d, v) in row.as_ref().iter().zip(v) {
                 axpy(*d, v.as_ref(), sum.as_mut());

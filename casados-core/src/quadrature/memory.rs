@@ -6,7 +6,7 @@ use crate::finite::find_non_finite;
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::linalg::{axpy, dispatch};
 use crate::scalar::Real;
-use crate::shape::{Plain, Shape, plain};
+use crate::shape::{InBounds, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// `[T; NW]` of a function.
@@ -66,7 +66,9 @@ impl<F: Function, T: Real> StageMemory<F, T> {
         }
         for (entry, value) in jacobian.as_ref().iter().enumerate() {
             let (output, variable) = F::STRUCTURE.jacobian.at(entry);
-            if let (Some(dy), Some(d)) = (dy.as_mut().get_mut(output), d.as_ref().get(variable)) {
+            if let (Some(dy), Some(d)) =
+                (dy.as_mut().get_mut(output).in_bounds(), d.as_ref().get(variable).in_bounds())
+            {
                 axpy(*value, d.as_ref(), dy.as_mut());
             }
         }

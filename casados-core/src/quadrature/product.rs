@@ -3,7 +3,7 @@
 use crate::linalg::{Arithmetic, Kernel};
 use crate::model::Pattern;
 use crate::scalar::Lanes;
-use crate::shape::Array;
+use crate::shape::{Array, InBounds};
 
 /// `sum −= Dᵀ H D` at a stage (lower triangle), with `H` given by its lower triangle.
 pub(crate) struct CongruenceUpdate<'a, E, R, const S: usize> {
@@ -23,14 +23,14 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
     fn run<A: Arithmetic>(self) {
         let Self { pattern, nonlinear_variables: curved, entries, stage, d, g, sum } = self;
         for &row in curved {
-            if let Some(row) = g.get_mut(row as usize) {
+            if let Some(row) = g.get_mut(row as usize).in_bounds() {
                 row.as_mut().fill(E::from_f64(0.0));
             }
         }
         // G = H D
         let places = pattern.rows.iter().zip(pattern.columns);
         for ((&row, &column), values) in places.zip(entries) {
-            let Some(&value) = values.get(stage) else { continue };
+            let Some(&value) = values.get(stage).in_bounds() else { continue };
             add_scaled_row::<A, E, R>(value, d, column, g, row);
             if row != column {
                 add_scaled_row::<A, E, R>(value, d, row, g, column);
@@ -75,7 +75,10 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
 /// `g_to += value · d_from`
 #[inline(always)]
 fn add_scaled_row<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &mut [R], to: u32) {
-    let (Some(from), Some(to)) = (d.get(from as usize), g.get_mut(to as usize)) else { return };
+    let (Some(from), Some(to)) = (d.get(from as usize).in_bounds(), g.get_mut(to as usize).in_bounds())
+    else {
+        return;
+    };
     let value = -value;
     for (to, &from) in to.as_mut().iter_mut().zip(from.as_ref()) {
         *to = A::subtract(*to, value, from);
@@ -95,8 +98,14 @@ fn subtract_tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const 
 ) {
     let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
     for &variable in curved {
-        let (Some(d), Some(g)) = (d.get(variable as usize), g.get(variable as usize)) else { continue };
-        let (Some(d), Some(g)) = (d.as_ref().get(row..), g.as_ref().get(column..)) else { continue };
+        let (Some(d), Some(g)) = (d.get(variable as usize).in_bounds(), g.get(variable as usize).in_bounds())
+        else {
+            continue;
+        };
+        let (Some(d), Some(g)) = (d.as_ref().get(row..).in_bounds(), g.as_ref().get(column..).in_bounds())
+        else {
+            continue;
+        };
         let (Some(d), Some(g)) = (d.first_chunk::<ROWS>(), g.first_chunk::<COLUMNS>()) else { continue };
         for (tile, &d) in tile.iter_mut().zip(d) {
             A::subtract_row(tile, d, g);

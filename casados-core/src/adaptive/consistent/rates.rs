@@ -6,7 +6,7 @@ use crate::error::{Error, Place, Quantity};
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{InBounds, Matrix, Plain, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 
@@ -42,7 +42,7 @@ impl<M: Dae, T: Real> ExplicitRates<M, T> {
             if !rate.is_finite() {
                 return Err(non_finite_rate(Quantity::Residual, equation, rate));
             }
-            if let Some(to) = rates.as_mut().get_mut(M::STRUCTURE.jacobian.at(equation).1) {
+            if let Some(to) = rates.as_mut().get_mut(M::STRUCTURE.jacobian.at(equation).1).in_bounds() {
                 *to = rate;
             }
         }
@@ -64,14 +64,14 @@ impl<M: Dae, T: Real> ExplicitRates<M, T> {
         let (coefficients, others) = self.jacobian.as_ref().split_at(M::Shape::NX);
         for (entry, value) in others.iter().enumerate() {
             let (equation, variable) = M::STRUCTURE.jacobian.at(M::Shape::NX + entry);
-            let Some(c) = coefficients.get(equation) else { continue };
+            let Some(c) = coefficients.get(equation).in_bounds() else { continue };
             let derivative = -*value / *c;
             if !derivative.is_finite() {
                 return Err(non_finite_rate(Quantity::Jacobian, equation, derivative));
             }
             let row = to.as_mut().get_mut(variable.wrapping_sub(M::Shape::NX));
             let state = M::STRUCTURE.jacobian.at(equation).1;
-            if let Some(to) = row.and_then(|row| row.as_mut().get_mut(state)) {
+            if let Some(to) = row.and_then(|row| row.as_mut().get_mut(state).in_bounds()) {
                 *to = derivative;
             }
         }

@@ -4,6 +4,7 @@
 use crate::linalg::{Arithmetic, COMPLEX_PARTS, Complex, Kernel, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Real, SideBySide};
+use crate::shape::InBounds;
 use core::marker::PhantomData;
 
 /// The number of stages in a group.
@@ -42,7 +43,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for TransformResidu
         for equation in 0..rows.len() {
             let mut values = [[T::ZERO; STAGES_PER_GROUP]; G];
             for (values, f) in values.iter_mut().zip(&f) {
-                if let Some(f) = f.get(equation) {
+                if let Some(f) = f.get(equation).in_bounds() {
                     *values = *f;
                 }
             }
@@ -52,7 +53,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for TransformResidu
                     sum.parts[l] = A::subtract(sum.parts[l], -left.parts[l], *value);
                 }
             }
-            if let Some([[row]]) = rows.get_mut(slot::<M>(equation)) {
+            if let Some([[row]]) = rows.get_mut(slot::<M>(equation)).in_bounds() {
                 *row = sum;
             }
         }
@@ -106,10 +107,10 @@ impl<T: Real, const S: usize, const G: usize> Kernel for ApplyIncrement<'_, '_, 
                     }
                 }
                 for g in 0..G {
-                    if let Some(k) = points[g].get_mut(index) {
+                    if let Some(k) = points[g].get_mut(index).in_bounds() {
                         *k = y[g];
                     }
-                    let Some(state) = points[g].get_mut(nx + index) else { continue };
+                    let Some(state) = points[g].get_mut(nx + index).in_bounds() else { continue };
                     for i in 0..STAGES_PER_GROUP {
                         let relative = (xi[g][i] - state[i]) * scale;
                         sums[g][i] = A::subtract(sums[g][i], -relative, relative);
@@ -122,7 +123,7 @@ impl<T: Real, const S: usize, const G: usize> Kernel for ApplyIncrement<'_, '_, 
                         let relative = (y[g][i] - before[g][i]) * scale;
                         sums[g][i] = A::subtract(sums[g][i], -relative, relative);
                     }
-                    if let Some(z) = points[g].get_mut(nx + index) {
+                    if let Some(z) = points[g].get_mut(nx + index).in_bounds() {
                         *z = y[g];
                     }
                 }

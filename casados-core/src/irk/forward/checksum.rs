@@ -4,6 +4,7 @@
 use crate::irk::directions::checksum_weight;
 use crate::linalg::{Arithmetic, PanelRow, Prefetch, Visitor};
 use crate::scalar::{Field, each};
+use crate::shape::InBounds;
 
 /// Number of accumulators of a sum over all columns. Sums of SIMD registers use the first one only.
 pub(in crate::irk) const ACCUMULATORS: usize = 4;
@@ -55,7 +56,7 @@ impl<E: Field, const S: usize, const W: usize> ChecksumVisitor<'_, E, S, W> {
 impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for ChecksumVisitor<'_, E, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_solved<A: Arithmetic>(&mut self, slot: usize, panel_row: &PanelRow<E, S, W>) {
-        let Some(sums) = self.sums.get_mut(slot) else { return };
+        let Some(sums) = self.sums.get_mut(slot).in_bounds() else { return };
         each!(i < S => { accumulate::<A, E, W>(&mut sums[i], self.minus_weights, &panel_row[i]); });
     }
     #[cfg_attr(not(debug_assertions), inline(always))]

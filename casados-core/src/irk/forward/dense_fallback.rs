@@ -6,7 +6,7 @@ use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::scalar::Lanes;
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
     /// Solves column by column, with the factors of the whole matrix.
@@ -34,7 +34,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
 #[inline(never)]
 fn read_column<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
     for (to, row) in to.iter_mut().zip(rows) {
-        if let Some(element) = row.get(column) {
+        if let Some(element) = row.get(column).in_bounds() {
             *to = *element;
         }
     }
@@ -44,7 +44,7 @@ fn read_column<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut
 #[inline(never)]
 pub(super) fn write_column<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
     for (from, row) in from.iter().zip(rows) {
-        if let Some(element) = row.get_mut(column) {
+        if let Some(element) = row.get_mut(column).in_bounds() {
             *element = *from;
         }
     }

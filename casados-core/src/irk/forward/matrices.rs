@@ -4,7 +4,7 @@ use super::output::DerivativeOutput;
 use crate::model::NO_COLUMN;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::shape::Matrix;
+use crate::shape::{InBounds, Matrix};
 use core::mem::take;
 
 /// Three matrices of derivatives with respect to `x₀`, `u` and `p`, in column-major order.
@@ -62,11 +62,11 @@ impl<M: Plan, T: Lanes> DerivativeOutput<T> for DerivativeMatrices<'_, M, T> {
         // The memory after the last column of each matrix: directions ascend.
         let [x, u, p] = &mut self.matrices;
         let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
-        let directions = self.plan.structure().directions.get(column..).unwrap_or_default();
+        let directions = self.plan.structure().directions.get(column..).in_bounds().unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
             let (part, own) = Self::matrix_and_column(self.plan, direction as usize);
-            let Some((next, rest)) = rest.get_mut(part) else { continue };
-            let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
+            let Some((next, rest)) = rest.get_mut(part).in_bounds() else { continue };
+            let from = take(rest).get_mut((own - *next) * self.rows..).in_bounds().unwrap_or_default();
             (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
             *next = own + 1;
         }
@@ -93,7 +93,7 @@ impl<T: Lanes> DerivativeOutput<T> for SingleMatrix<'_, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
-        let matrix = self.matrix.get_mut(column * self.rows..).unwrap_or_default();
+        let matrix = self.matrix.get_mut(column * self.rows..).in_bounds().unwrap_or_default();
         // `max(1)`: the chunk length is positive for a model without states too.
         for (to, own) in columns.iter_mut().zip(matrix.chunks_exact_mut(self.rows.max(1))) {
             *to = own;

@@ -2,6 +2,7 @@
 
 use crate::linalg::{Arithmetic, PanelRow};
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 use core::ops::Range;
 
 /// The destination of derivatives.
@@ -37,7 +38,7 @@ impl<E: Lanes, const S: usize, const W: usize> PanelCombination<'_, E, S, W> {
     pub fn write<A: Arithmetic>(&self, to: &mut [&mut [E]; W]) -> E {
         let mut sums = [E::from_f64(0.0); W];
         let (blocks, rest) =
-            self.dy.get(self.unknowns.clone()).unwrap_or_default().as_chunks::<ROWS_PER_BLOCK>();
+            self.dy.get(self.unknowns.clone()).in_bounds().unwrap_or_default().as_chunks::<ROWS_PER_BLOCK>();
         for (n, dy) in blocks.iter().enumerate() {
             self.write_rows::<A, ROWS_PER_BLOCK>(n * ROWS_PER_BLOCK, dy, to, &mut sums);
         }

@@ -23,7 +23,7 @@ use crate::linalg::{Arithmetic, Kernel, PanelRow, dispatch, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Piece, Real, SideBySide, Tangent};
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -72,7 +72,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
         work.evaluate_tangent();
         let StageWorkspace { variable_scratch: [sum, tangent], increment, linearization: linear, .. } = work;
         for (equation, tangent) in tangent.as_ref().iter().enumerate().take(M::Shape::NK) {
-            if let Some(to) = increment.as_mut().get_mut(slot::<M>(equation)) {
+            if let Some(to) = increment.as_mut().get_mut(slot::<M>(equation)).in_bounds() {
                 *to = tangent.map(|element| [element]);
             }
         }
@@ -106,7 +106,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
         panels!([D::COLUMNS, directions.columns()], T, S, column, W => {
             let mut right = ArrayK::<M, PanelRow<T, S, W>>::zeroed();
             for c in 0..W {
-                let inputs = work.variable_scratch[0].as_mut().get_mut(nx + nk..).unwrap_or_default();
+                let inputs = work.variable_scratch[0].as_mut().get_mut(nx + nk..).in_bounds().unwrap_or_default();
                 for (index, input) in inputs.iter_mut().enumerate() {
                     let mut row = [T::ZERO; 1];
                     directions.add_scaled(nx + index, T::ONE, column + c, &mut row);
@@ -123,7 +123,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
                 });
                 work.evaluate_tangent();
                 for (equation, tangent) in work.variable_scratch[1].as_ref().iter().enumerate().take(nk) {
-                    if let Some(rows) = right.as_mut().get_mut(slot::<M>(equation)) {
+                    if let Some(rows) = right.as_mut().get_mut(slot::<M>(equation)).in_bounds() {
                         write_column(tangent, rows, c);
                     }
                 }

@@ -11,6 +11,7 @@ use crate::linalg::{Arithmetic, PanelRow, RowVisitor, for_each_row, is_unrolled}
 use crate::model::Dependent;
 use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, each};
+use crate::shape::InBounds;
 
 /// Right-hand sides if every direction is an element of `w` and `V_n` the unit matrix: scatters the
 /// entries of the Jacobian to all panels.
@@ -37,7 +38,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S
         let (begin, width) = panel_of::<E>(true, column, self.directions.columns(), S);
         let offset = begin * nk * S + (column - begin);
         each!(i < S => {
-            if let Some(to) = self.dy.get_mut(offset + (slot * S + i) * width) {
+            if let Some(to) = self.dy.get_mut(offset + (slot * S + i) * width).in_bounds() {
                 *to = *to - values[i];
             }
         });
@@ -80,7 +81,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Scatter { plan, jacobian, nodes, directions, .. } = &*self.0;
-        let Some(dependent) = plan.structure().elimination.dependents.get(row) else { return };
+        let Some(dependent) = plan.structure().elimination.dependents.get(row).in_bounds() else { return };
         let Some((slot, velocity, products)) = eliminated_entry(*plan, jacobian, nodes, dependent) else {
             return;
         };
@@ -172,9 +173,9 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
     column: usize,
     values: &[E; S],
 ) {
-    let Some(panel_row) = dy.get_mut(slot) else { return };
+    let Some(panel_row) = dy.get_mut(slot).in_bounds() else { return };
     for (row, &value) in panel_row.iter_mut().zip(values) {
-        if let Some(to) = row.get_mut(column) {
+        if let Some(to) = row.get_mut(column).in_bounds() {
             *to = *to - value;
         }
     }
@@ -252,11 +253,11 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         values: &[E; S],
     ) {
         if self.kinematic.plan.kinematic(state).is_some() {
-            let Some(x) = self.dy.get(state) else { return };
+            let Some(x) = self.dy.get(state).in_bounds() else { return };
             each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], &x[i]); });
             return;
         }
-        let Some(v) = self.kinematic.v.get(state) else { return };
+        let Some(v) = self.kinematic.v.get(state).in_bounds() else { return };
         each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], v); });
     }
 
@@ -284,7 +285,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
         if self.kinematic.plan.kinematic(slot).is_some() {
             return;
         }
-        if let Some(to) = self.dy.get_mut(slot) {
+        if let Some(to) = self.dy.get_mut(slot).in_bounds() {
             *to = *panel_row;
         }
     }
@@ -316,7 +317,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVis
         // The first entry of an equation starts the sum.
         let mut panel_row = [[E::from_f64(0.0); W]; S];
         if Self::CLEARS_FIRST || r < next {
-            panel_row = *self.dy.get(slot).unwrap_or(&panel_row);
+            panel_row = *self.dy.get(slot).in_bounds().unwrap_or(&panel_row);
         } else {
             self.clear_rows(next, r);
         }
@@ -324,7 +325,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVis
             return;
         }
         self.subtract_state::<A>(&mut panel_row, c - plan.nx(), values);
-        if let Some(to) = self.dy.get_mut(slot) {
+        if let Some(to) = self.dy.get_mut(slot).in_bounds() {
             *to = panel_row;
         }
     }

@@ -6,7 +6,7 @@ use crate::irk::directions::IdentityDirections;
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 use core::mem::take;
 
 impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
@@ -30,9 +30,9 @@ impl<M: Dae, T: Real> DerivativeOutput<T> for DirectionRows<'_, M, T> {
     fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
         let (mut next, mut rest) = (0, self.rows.as_mut());
-        let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
+        let directions = M::STRUCTURE.directions.get(column..).in_bounds().unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
-            let from = take(&mut rest).get_mut(direction as usize - next..).unwrap_or_default();
+            let from = take(&mut rest).get_mut(direction as usize - next..).in_bounds().unwrap_or_default();
             if let Some((own, following)) = from.split_first_mut() {
                 (*to, rest, next) = (own.as_mut(), following, direction as usize + 1);
             }

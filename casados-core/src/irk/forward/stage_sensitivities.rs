@@ -4,6 +4,7 @@ use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel_width, static_col
 use crate::linalg::{Arithmetic, Block, PanelRow};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// Whether the stages of a variable are adjacent in a panel of `D`. They are not if a panel exceeds
 /// the L1 cache, or if numbers are SIMD registers, there are only sixteen of them, and more than
@@ -68,9 +69,13 @@ impl<P: Plan, E: Lanes, D: Directions<E>, const S: usize> StageRowWriter<P, E, D
         for (c, &variable) in self.plan.structure().curved.iter().enumerate() {
             let variable = variable as usize;
             if (nx..2 * nx).contains(&variable) {
-                let (Some(dk), Some(start)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
+                let (Some(dk), Some(start)) =
+                    (dy.get(variable - nx).in_bounds(), v.get(variable - nx).in_bounds())
+                else {
+                    continue;
+                };
                 for i in 0..S {
-                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) else { continue };
+                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)).in_bounds() else { continue };
                     let mut row = *start;
                     for (column, dk) in self.minus_ha.iter().zip(dk) {
                         A::subtract_row(&mut row, column[i], dk);
@@ -79,15 +84,15 @@ impl<P: Plan, E: Lanes, D: Directions<E>, const S: usize> StageRowWriter<P, E, D
                 }
             } else if variable < 2 * nx + nz {
                 let unknown = if variable < nx { variable } else { variable - nx };
-                let Some(unknown_rows) = dy.get(unknown) else { continue };
+                let Some(unknown_rows) = dy.get(unknown).in_bounds() else { continue };
                 for (i, own) in unknown_rows.iter().enumerate() {
-                    if let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) {
+                    if let Some(d) = d.get_mut(rows.row_index::<S>(c, i)).in_bounds() {
                         *d = *own;
                     }
                 }
             } else {
                 for i in 0..S {
-                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) else { continue };
+                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)).in_bounds() else { continue };
                     *d = [E::from_f64(0.0); W];
                     self.directions.add_scaled(variable - nx - nz, E::from_f64(1.0), column, d);
                 }

@@ -18,7 +18,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
-use crate::shape::{Aligned, Array, Plain, Shape, copy};
+use crate::shape::{Aligned, Array, InBounds, Plain, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -393,8 +393,11 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         }
         // The unit matrix is known: it is not read.
         let base = if is_identity { None } else { Some(v) };
-        let ones =
-            if is_identity { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };
+        let ones = if is_identity {
+            plan.structure().directions.get(column..).in_bounds().unwrap_or_default()
+        } else {
+            &[]
+        };
         if let Some(to) = &mut self.result {
             let end = PanelCombination {
                 base,

@@ -9,7 +9,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayW, Dae};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, InBounds, Shape};
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
     /// Writes the derivatives of `x` at a point of the step with the `weights` `h b_i(θ)`. This and
@@ -109,7 +109,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
         let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
         for &variable in variables {
             let variable = variable as usize;
-            let Some(row) = d.get_mut(variable * nw..(variable + 1) * nw) else { continue };
+            let Some(row) = d.get_mut(variable * nw..(variable + 1) * nw).in_bounds() else { continue };
             row.fill(zero);
             // A state or an input without influence on the model has the derivative one with
             // respect to itself.
@@ -121,7 +121,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
                 variable.checked_sub(nx + nz).filter(|_| variable >= 2 * nx + nz)
             };
             let own_direction = own_direction.filter(|&own| own >= nx || column_of(plan, own).is_none());
-            if let Some(element) = own_direction.and_then(|own| row.get_mut(own)) {
+            if let Some(element) = own_direction.and_then(|own| row.get_mut(own).in_bounds()) {
                 *element = one;
             }
             if variable >= 2 * nx + nz {
@@ -132,7 +132,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
                 let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
                 let v = panel::<E, W>(v, column, nx);
                 let mut values = [zero; W];
-                if let Some(panel_row) = dy.get(unknown) {
+                if let Some(panel_row) = dy.get(unknown).in_bounds() {
                     match (v.get(unknown), coefficients.a.get(stage)) {
                         (Some(v), Some(a)) if (nx..2 * nx).contains(&variable) => {
                             values = *v;
@@ -140,13 +140,13 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for WriteStageRows<'_, M, E, S> {
                                 A::subtract_row(&mut values, -(h * a), dk);
                             }
                         }
-                        _ => values = panel_row.get(stage).copied().unwrap_or(values),
+                        _ => values = panel_row.get(stage).in_bounds().copied().unwrap_or(values),
                     }
                 }
                 for (c, &value) in values.iter().enumerate() {
                     let direction = plan.structure().directions.get(column + c);
                     if let Some(element) =
-                        direction.and_then(|&direction| row.get_mut(direction as usize))
+                        direction.and_then(|&direction| row.get_mut(direction as usize).in_bounds())
                     {
                         *element = value;
                     }

@@ -26,7 +26,7 @@ use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::quadrature::OptionalIntegrand;
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
-use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
+use crate::shape::{Aligned, Array, InBounds, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 
 /// Memory of second-order sensitivities.
@@ -143,7 +143,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     ) {
         let Self { backward, mu, entries, .. } = self;
         for (equation, to) in mu.as_mut().iter_mut().enumerate() {
-            if let Some(mu) = backward.mu.as_ref().get(slot::<M>(equation)) {
+            if let Some(mu) = backward.mu.as_ref().get(slot::<M>(equation)).in_bounds() {
                 *to = mu.map(|[mu]| mu);
             }
         }

@@ -5,6 +5,7 @@ use crate::irk::directions::column_of;
 use crate::linalg::{Arithmetic, Kernel};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// Adds second derivatives in a control or a parameter alone: its row of `D_i` is a row of the unit
 /// matrix.
@@ -22,9 +23,10 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for DiagonalUpdate<'_, M, E, S> {
         for diagonal_controls in self.plan.structure().diagonal_controls {
             let column = column_of(self.plan, diagonal_controls.direction as usize);
             let Some(column) = column else { continue };
-            let (Some(entries), Some(row)) =
-                (self.entries.get(diagonal_controls.entry as usize), self.sum.row_mut(column, column))
-            else {
+            let (Some(entries), Some(row)) = (
+                self.entries.get(diagonal_controls.entry as usize).in_bounds(),
+                self.sum.row_mut(column, column),
+            ) else {
                 continue;
             };
             let Some(to) = row.first_mut() else { continue };

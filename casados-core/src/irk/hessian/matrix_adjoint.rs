@@ -29,7 +29,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
 use crate::plan::{Plan, PlanOf, has_ordered_derivatives};
 use crate::scalar::Lanes;
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 
 /// Whether the matrix adjoint is used: for scalars, if it takes less than 4/9 of the operations of
 /// the products of panels, per direction. The factor accounts for the memory traffic of a solve.
@@ -213,8 +213,8 @@ impl<M: Plan, E: Lanes, const S: usize> PanelKernel<'_, M, E, S> {
     fn process_panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
         let (plan, nk) = (self.plan, self.plan.nk());
         let (rows, count) = (StageRowLayout::for_plan::<M, E, S>(plan), plan.structure().curved.len() * S);
-        let g = self.g.get_mut(..count * W).unwrap_or_default().as_chunks_mut::<W>().0;
-        let m = self.m.get_mut(..nk * S * W).unwrap_or_default();
+        let g = self.g.get_mut(..count * W).in_bounds().unwrap_or_default().as_chunks_mut::<W>().0;
+        let m = self.m.get_mut(..nk * S * W).in_bounds().unwrap_or_default();
         let m = m.as_chunks_mut::<W>().0.as_chunks_mut::<S>().0;
         // Equal lengths, so that the optimiser removes bounds checks.
         if g.len() != count || m.len() != nk {
@@ -318,7 +318,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> RightHandSide<'_, M, E, 
             }
             if is_variable_at(plan, state, nx + unknown) {
                 for stage in 0..S {
-                    let Some(g) = self.g.get(rows.row_index::<S>(state, stage)) else { continue };
+                    let Some(g) = self.g.get(rows.row_index::<S>(state, stage)).in_bounds() else { continue };
                     for (row, minus_ha) in panel_row.iter_mut().zip(self.minus_ha) {
                         A::subtract_row(row, minus_ha[stage], g);
                     }

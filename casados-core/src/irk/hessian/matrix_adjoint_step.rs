@@ -13,6 +13,7 @@ use crate::irk::forward::stage_sensitivities::StageRowLayout;
 use crate::linalg::{Arithmetic, PanelRow};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// `−ω`, and `1 − bᵀ A⁻¹ 1`.
 pub(in crate::irk) struct InverseWeights<E, const S: usize> {
@@ -119,7 +120,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
             A::subtract_row(&mut panel_row, -inverse.r_infinity, lambda);
         }
         if let Some((equation, _, values)) = self.plan.entry(self.jacobian, state)
-            && let Some(m) = self.m.get(self.plan.slot(equation))
+            && let Some(m) = self.m.get(self.plan.slot(equation)).in_bounds()
         {
             for ((&weight, &value), m) in inverse.minus_weights.iter().zip(values).zip(m) {
                 A::subtract_row(&mut panel_row, weight * value, m);
@@ -170,7 +171,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, 
                 && of == variable
             {
                 position += 1;
-                if let Some(m) = self.m.get(self.plan.slot(equation)) {
+                if let Some(m) = self.m.get(self.plan.slot(equation)).in_bounds() {
                     for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
                         A::subtract_row(sum, value, m);
                     }
@@ -235,7 +236,7 @@ pub(in crate::irk) fn add_stages<A: Arithmetic, E: Lanes, const S: usize, const 
     curved: usize,
 ) {
     for (stage, row) in panel_row.iter_mut().enumerate() {
-        if let Some(g) = g.get(rows.row_index::<S>(curved, stage)) {
+        if let Some(g) = g.get(rows.row_index::<S>(curved, stage)).in_bounds() {
             A::subtract_row(row, E::from_f64(-1.0), g);
         }
     }

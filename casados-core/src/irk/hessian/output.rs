@@ -9,7 +9,7 @@ use crate::model::Dae;
 use crate::plan::{Plan, count_before};
 use crate::result::Hessian;
 use crate::scalar::Lanes;
-use crate::shape::Matrix;
+use crate::shape::{InBounds, Matrix};
 use crate::structure::Structure;
 
 /// The lower triangle of a symmetric matrix.
@@ -93,7 +93,7 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
             }
         };
         let [first, end] = known.unwrap_or_else(|| active_columns(structure, OF_ROWS));
-        let directions = structure.directions.get(first..end).unwrap_or_default();
+        let directions = structure.directions.get(first..end).in_bounds().unwrap_or_default();
         let mut total = zero;
         for (c, to) in columns.chunks_exact_mut(count_of_rows.max(1)).enumerate() {
             let column_values =
@@ -114,7 +114,7 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
                 }
             }
             let integrand_range = (column + c) * nw + row..(column + c + 1) * nw;
-            if let Some(more) = more.and_then(|more| more.get(integrand_range)) {
+            if let Some(more) = more.and_then(|more| more.get(integrand_range).in_bounds()) {
                 for (to, &more) in to.iter_mut().zip(more) {
                     *to = *to + more;
                 }

@@ -10,6 +10,7 @@ use crate::irk::forward::stage_sensitivities::stages_adjacent;
 use crate::linalg::{Arithmetic, Kernel, is_large_plan};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// Number of columns of the memory for `G`: two panels if there are enough registers for their
 /// products, or `G` and `M` of one panel (`matrix_adjoint`). Firmware trades time for memory.
@@ -102,7 +103,13 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
     ) {
         let curved = self.plan.structure().curved.len();
         let rows = curved * L;
-        let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * N * P * W).unwrap_or_default();
+        let g = self
+            .g
+            .as_flattened_mut()
+            .as_flattened_mut()
+            .get_mut(..rows * N * P * W)
+            .in_bounds()
+            .unwrap_or_default();
         let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
         multiply::<A, M, E, S, L, N, W, P>(
             self.plan,
@@ -131,8 +138,8 @@ impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
         let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
         panels!([static_columns::<M, E>(), columns], E, S, row, V => {
             if row >= column {
-                let g = g.get(g_begin..g_begin + count).unwrap_or_default();
-                let d = panel::<E, V>(self.d, row, row_count).get(d_begin..d_begin + count).unwrap_or_default();
+                let g = g.get(g_begin..g_begin + count).in_bounds().unwrap_or_default();
+                let d = panel::<E, V>(self.d, row, row_count).get(d_begin..d_begin + count).in_bounds().unwrap_or_default();
                 let (sum, fresh) = (&mut self.sum, self.from_zero && d_begin == 0);
                 if const { size_of::<E>() > 8 && V > 2 && W <= 4 && A::WIDE } {
                     subtract_panel_tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
@@ -222,7 +229,7 @@ fn subtract_outer<
     g: &[[E; W]; P],
     tile_index: usize,
 ) {
-    let Some(d) = d.as_chunks::<ROWS>().0.get(tile_index) else { return };
+    let Some(d) = d.as_chunks::<ROWS>().0.get(tile_index).in_bounds() else { return };
     for (tile, &d) in tile.iter_mut().zip(d) {
         for (tile, g) in tile.iter_mut().zip(g) {
             A::subtract_row(tile, d, g);

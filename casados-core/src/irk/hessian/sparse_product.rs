@@ -7,6 +7,7 @@ use crate::linalg::Arithmetic;
 use crate::model::Term;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 use crate::structure::MAX_INTERLEAVED_ROWS;
 
 /// Computes `G = −H D` at all stages in the panel that begins with `column`; `G` has the row layout
@@ -25,7 +26,7 @@ pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Plan, E: Lanes, const S: 
         return;
     }
     for stage in 0..S {
-        let g = g.get_mut(stage * plan.structure().curved.len()..).unwrap_or_default();
+        let g = g.get_mut(stage * plan.structure().curved.len()..).in_bounds().unwrap_or_default();
         multiply::<A, M, E, S, 1, 1, W, 1>(plan, entries, d, g.as_chunks_mut().0, stage, column);
     }
 }
@@ -56,7 +57,8 @@ pub(in crate::irk) fn multiply<
         let first = stage + group * L;
         for (p, of_d) in of_d.iter_mut().enumerate() {
             let panel = panel::<E, W>(d, column + p * W, curved * S);
-            *of_d = panel.get(first * curved..(first + L) * curved).unwrap_or_default().as_chunks().0;
+            *of_d =
+                panel.get(first * curved..(first + L) * curved).in_bounds().unwrap_or_default().as_chunks().0;
         }
     }
     let mut terms = plan.structure().symmetric;
@@ -118,15 +120,15 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         row: usize,
     ) -> &'static [Term] {
         let mut panel_rows = [[[[E::from_f64(0.0); W]; P]; L]; N];
-        let Some(&first) = terms.get(row) else { return &[] };
+        let Some(&first) = terms.get(row).in_bounds() else { return &[] };
         while let Some((current_terms, rest)) = terms.split_first_chunk::<R>()
             && let Some(term) = current_terms.get(row)
             && term.row == first.row
         {
-            if let Some(values) = self.entries.get(term.entry as usize) {
+            if let Some(values) = self.entries.get(term.entry as usize).in_bounds() {
                 for (group, (panel_row, of_d)) in panel_rows.iter_mut().zip(self.d).enumerate() {
                     for (p, d) in of_d.iter().enumerate() {
-                        let Some(d) = d.get(term.column as usize) else { continue };
+                        let Some(d) = d.get(term.column as usize).in_bounds() else { continue };
                         subtract_stages::<A, E, L, W, P>(
                             panel_row,
                             p,
@@ -139,7 +141,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
             terms = rest;
         }
         for (group, panel_row) in panel_rows.iter().enumerate() {
-            if let Some(to) = g.get_mut(group * curved + first.row as usize) {
+            if let Some(to) = g.get_mut(group * curved + first.row as usize).in_bounds() {
                 *to = *panel_row;
             }
         }
@@ -156,7 +158,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     ) -> &'static [Term] {
         let mut remaining_terms = terms;
         for (group, of_d) in self.d.iter().enumerate() {
-            let g = g.get_mut(group * curved..).unwrap_or_default();
+            let g = g.get_mut(group * curved..).in_bounds().unwrap_or_default();
             for stage in 0..L / K {
                 for part in 0..W / C {
                     let values = self.stage + group * L + stage * K;
@@ -182,16 +184,16 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         {
             let mut factors = [[[E::from_f64(0.0); C]; P]; K];
             for (p, of_d) in of_d.iter().enumerate() {
-                let Some(d) = of_d.get(current_terms[0].column as usize) else { continue };
-                let Some(d) = d.as_chunks::<K>().0.get(stage) else { continue };
+                let Some(d) = of_d.get(current_terms[0].column as usize).in_bounds() else { continue };
+                let Some(d) = d.as_chunks::<K>().0.get(stage).in_bounds() else { continue };
                 for (factors, d) in factors.iter_mut().zip(d) {
-                    if let Some(d) = d.as_chunks::<C>().0.get(part) {
+                    if let Some(d) = d.as_chunks::<C>().0.get(part).in_bounds() {
                         factors[p] = *d;
                     }
                 }
             }
             for (term, panel_rows) in current_terms.iter().zip(&mut panel_rows) {
-                let Some(values) = self.entries.get(term.entry as usize) else { continue };
+                let Some(values) = self.entries.get(term.entry as usize).in_bounds() else { continue };
                 for ((panel_rows, &value), factors) in
                     panel_rows.iter_mut().zip(values_from(values, of_values)).zip(&factors)
                 {
@@ -203,10 +205,10 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
             terms = rest;
         }
         for (term, panel_rows) in rows.iter().zip(&panel_rows) {
-            let Some(to) = g.get_mut(term.row as usize) else { continue };
-            let Some(to) = to.as_chunks_mut::<K>().0.get_mut(stage) else { continue };
+            let Some(to) = g.get_mut(term.row as usize).in_bounds() else { continue };
+            let Some(to) = to.as_chunks_mut::<K>().0.get_mut(stage).in_bounds() else { continue };
             for (to, panel_rows) in to.as_flattened_mut().iter_mut().zip(panel_rows.as_flattened()) {
-                if let Some(to) = to.as_chunks_mut::<C>().0.get_mut(part) {
+                if let Some(to) = to.as_chunks_mut::<C>().0.get_mut(part).in_bounds() {
                     *to = *panel_rows;
                 }
             }
@@ -239,5 +241,5 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
 /// The values from the stage `first` on.
 #[inline(always)]
 fn values_from<V>(all: &[V], first: usize) -> &[V] {
-    all.get(first..).unwrap_or_default()
+    all.get(first..).in_bounds().unwrap_or_default()
 }

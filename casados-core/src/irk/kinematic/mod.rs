@@ -26,7 +26,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae, Dependent, Kinematic};
 use crate::plan::{self, DerivedFacts, Plan, PlanOf, StructureTable};
 use crate::scalar::{Lanes, each};
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 
 /// Whether any state is kinematic.
 pub(super) const fn has_kinematic_states<M: Dae>() -> bool {
@@ -201,14 +201,14 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisit
             return;
         };
         let (from, to) = if const { WHAT == RECONSTRUCT } { (velocity, state) } else { (state, velocity) };
-        let Some(from) = rows.get(from) else { return };
+        let Some(from) = rows.get(from).in_bounds() else { return };
         let mut product = [[E::from_f64(0.0); W]; S];
         if const { WHAT == RECONSTRUCT } {
             subtract_product::<A, E, S, W>(&mut product, minus_ha, from);
         } else {
             subtract_transposed::<A, E, S, W>(&mut product, minus_ha, from);
         }
-        if let Some(to) = rows.get_mut(to) {
+        if let Some(to) = rows.get_mut(to).in_bounds() {
             subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &product);
         }
     }
@@ -231,9 +231,10 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisit
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, index: usize) {
         let VelocityRows { plan, jacobian, minus_ha, rows, sum } = &mut self.0;
-        let Some(kinematic) = plan.structure().elimination.dependents.get(index) else { return };
+        let Some(kinematic) = plan.structure().elimination.dependents.get(index).in_bounds() else { return };
         let Some((slot, values, derivative)) = dependent_entry(*plan, kinematic, jacobian) else { return };
-        let (Some(&own), Some(&row)) = (rows.get(kinematic.state as usize), rows.get(slot)) else { return };
+        let Some(&own) = rows.get(kinematic.state as usize).in_bounds() else { return };
+        let Some(&row) = rows.get(slot).in_bounds() else { return };
         let (mut own_row, mut row) = (own, row);
         if kinematic.first {
             *sum = [[E::from_f64(0.0); W]; S];
@@ -243,7 +244,7 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisit
                 subtract_product::<A, E, S, W>(sum, minus_ha, &own_row);
             }
             subtract_diagonal::<A, E, S, W>(&mut row, values, if derivative { &own_row } else { sum });
-            if let Some(to) = rows.get_mut(slot) {
+            if let Some(to) = rows.get_mut(slot).in_bounds() {
                 *to = row;
             }
             return;
@@ -282,7 +283,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
         let Some(minus_c) = minus_c(kinematic, self.jacobian) else { return row };
         match self.plan.velocity(kinematic) {
             Some(velocity) => {
-                if let Some(v) = self.v.get(velocity) {
+                if let Some(v) = self.v.get(velocity).in_bounds() {
                     A::subtract_row(&mut row, minus_c, v);
                 }
             }
@@ -323,7 +324,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
             let of = self.plan.kinematic(dependent.state as usize);
             if let (Some(of), Some((slot, values, true))) =
                 (of, dependent_entry(self.plan, dependent, self.jacobian))
-                && let Some(row) = rows.get_mut(slot)
+                && let Some(row) = rows.get_mut(slot).in_bounds()
             {
                 let own = self.velocity_directions::<A>(of);
                 subtract_diagonal::<A, E, S, W>(row, values, &[own; S]);
@@ -367,7 +368,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, c
         let mut panel_row = [[E::from_f64(0.0); W]; S];
         match (forward.plan.velocity(kinematic), minus_c(kinematic, forward.jacobian)) {
             (Some(velocity), Some(minus_c)) => {
-                if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity)) {
+                if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity).in_bounds()) {
                     panel_row = [*v; S];
                     subtract_product::<A, E, S, W>(&mut panel_row, minus_ha, dk);
                 }
@@ -377,7 +378,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, c
             }
             _ => panel_row = [forward.velocity_directions::<A>(kinematic); S],
         }
-        if let Some(row) = rows.get_mut(state) {
+        if let Some(row) = rows.get_mut(state).in_bounds() {
             *row = panel_row;
         }
         visitor.on_solved::<A>(state, &panel_row);

@@ -10,6 +10,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Computes `k_q`.
@@ -108,15 +109,15 @@ kernels! {
             let Some(kinematic) = plan.kinematic(state) else { continue };
             if let Some(v) = plan.velocity(kinematic)
                 && let (Some(&x), Some(&rest), Some(k)) =
-                    (x.get(v), rest.get(v), y.get(v))
-                && let Some(xi) = points.get_mut(plan.nx() + v)
+                    (x.get(v).in_bounds(), rest.get(v).in_bounds(), y.get(v).in_bounds())
+                && let Some(xi) = points.get_mut(plan.nx() + v).in_bounds()
             {
                 *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
                 for xi in xi {
                     *xi = *xi + x;
                 }
             }
-            if let (Some(y), Some(k)) = (y.get_mut(state), kinematic_derivative(plan, state, jacobian, points)) {
+            if let (Some(y), Some(k)) = (y.get_mut(state).in_bounds(), kinematic_derivative(plan, state, jacobian, points)) {
                 *y = k;
             }
         }
@@ -140,7 +141,7 @@ kernels! {
             else {
                 continue;
             };
-            let Some(f) = f.get_mut(row) else { continue };
+            let Some(f) = f.get_mut(row).in_bounds() else { continue };
             let product = values[0] * omitted;
             for (f, &node) in f.iter_mut().zip(&nodes) {
                 let derivative = (dependent.entry as usize) < plan.structure().blocks[1];
@@ -149,7 +150,7 @@ kernels! {
         }
         for state in 0..StructureTable::Kinematic.row_count(plan.structure()) {
             let Some(kinematic) = plan.kinematic(state) else { continue };
-            let Some(own) = f.get_mut(kinematic.equation as usize) else { continue };
+            let Some(own) = f.get_mut(kinematic.equation as usize).in_bounds() else { continue };
             let omitted = core::mem::replace(own, [E::from_f64(0.0); S])[0];
             for k in points.get_mut(state).into_iter().flatten() {
                 *k = *k - omitted;
@@ -168,7 +169,7 @@ kernels! {
         for state in 0..StructureTable::Kinematic.row_count(plan.structure()) {
             let k = kinematic_derivative(plan, state, jacobian, points);
             if let (Some(k), Some(point), Some(y)) =
-                (k, points.get_mut(state), y.get_mut(state))
+                (k, points.get_mut(state).in_bounds(), y.get_mut(state).in_bounds())
             {
                 (*point, *y) = (k, k);
             }
@@ -195,7 +196,7 @@ kernels! {
             if dependent.entry as usize >= plan.structure().blocks[1] {
                 residual = stage_values::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
             }
-            if let Some(f) = f.get_mut(row) {
+            if let Some(f) = f.get_mut(row).in_bounds() {
                 A::subtract_products(f, values, &residual);
             }
         }

@@ -21,6 +21,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
 use crate::options::{Jacobian, Newton};
 use crate::scalar::Real;
+use crate::shape::InBounds;
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
@@ -173,7 +174,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         for ((row, column), entry) in rows.iter().zip(columns).zip(self.linearization.jacobian.as_ref()) {
             let (magnitude, points) = (magnitude.as_mut(), self.points.as_ref());
             let (Some(magnitude), Some(point)) =
-                (magnitude.get_mut(*row as usize), points.get(*column as usize))
+                (magnitude.get_mut(*row as usize).in_bounds(), points.get(*column as usize).in_bounds())
             else {
                 continue;
             };
@@ -232,7 +233,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Solves for the increment with the available factors.
     pub(super) fn solve_dense(&mut self, coefficients: &Coefficients<T, S>) {
         for (equation, f) in self.f.as_ref().iter().enumerate() {
-            if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+            if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)).in_bounds() {
                 for (to, f) in to.iter_mut().zip(f) {
                     *to = [*f];
                 }

@@ -11,7 +11,7 @@ use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
 use crate::scalar::{Real, Scalar};
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 use crate::statistics::Statistics;
 use alloc::vec::Vec;
 
@@ -174,7 +174,8 @@ fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<PivotAnalysis
     for k in 0..n {
         let candidates = (k..n).flat_map(|row| (k..n).map(move |column| (row, column)));
         let (row, column) = candidates.max_by(|(i, j), (k, l)| {
-            let [first, second] = [i * n + j, k * n + l].map(|at| a.get(at).map_or(0.0, |a| a.abs()));
+            let [first, second] =
+                [i * n + j, k * n + l].map(|at| a.get(at).in_bounds().map_or(0.0, |a| a.abs()));
             first.total_cmp(&second)
         })?;
         negative ^= (row != k) ^ (column != k);

@@ -5,7 +5,7 @@ use super::norm::{KinematicScales, MeasureIncrement, larger_accumulator, unknown
 use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row, kernels};
 use crate::plan::{Plan, StructureTable};
 use crate::scalar::Lanes;
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 
 /// Copies the residual to the slots of the equations; residuals of kinematic states are zero.
 pub(in crate::irk) struct PlaceResidual<'a, M: Plan, E: Plain, const S: usize> {
@@ -36,7 +36,9 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for PlaceResidual<'_, M, E, S
         if self.plan.kinematic(slot).is_some() {
             return;
         }
-        if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
+        if let (Some(to), Some(f)) =
+            (self.increment.as_mut().get_mut(slot).in_bounds(), self.f.as_ref().get(equation).in_bounds())
+        {
             to.as_flattened_mut().copy_from_slice(f);
         }
     }

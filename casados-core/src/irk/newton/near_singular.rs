@@ -16,6 +16,7 @@ use crate::linalg::kinematic;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
+use crate::shape::InBounds;
 
 /// A pivot is small if rounding errors of the terms of its equation, divided by the pivot, exceed
 /// this fraction of the unknown: fewer than five digits are left.
@@ -45,9 +46,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             }
             let (slot, equation) = (pivot.slot as usize, pivot.equation as usize);
             let (Some(inverse), Some(y), Some(terms)) = (
-                factors.blocks.get(pivot.block as usize),
-                y.as_ref().get(slot),
-                self.equation_magnitudes.as_ref().get(equation),
+                factors.blocks.get(pivot.block as usize).in_bounds(),
+                y.as_ref().get(slot).in_bounds(),
+                self.equation_magnitudes.as_ref().get(equation).in_bounds(),
             ) else {
                 continue;
             };

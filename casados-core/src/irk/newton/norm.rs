@@ -4,7 +4,7 @@ use crate::irk::kinematic::minus_c;
 use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row};
 use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, Scalar};
-use crate::shape::Plain;
+use crate::shape::{InBounds, Plain};
 
 /// The size of an increment relative to the present unknowns.
 pub(in crate::irk) struct MeasureIncrement<'a, M: Plan, E: Plain, const S: usize> {
@@ -33,7 +33,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for MeasureIncrement<'_, M, E, S>
         let (increments, last) = unknowns_of(plan, increment.as_ref()).as_chunks::<4>();
         let (own_weights, last_weights) = unknowns_of_mut(plan, weights.as_mut()).as_chunks_mut::<4>();
         let (own_sizes, last_sizes) = unknowns_of_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
-        let mut states = x.as_ref().get(plan.facts().non_kinematic_range.0..).unwrap_or_default();
+        let mut states = x.as_ref().get(plan.facts().non_kinematic_range.0..).in_bounds().unwrap_or_default();
         let mut blocks_of_four = RelativeIncrements { largest: [zero; 4], sum: [zero; 4], change_per_step };
         for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
             blocks_of_four.include(&mut states, y, increments, weights, sizes);
@@ -166,7 +166,11 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for VelocityIncrements<'_, M,
             return;
         };
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
-        let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
+        let (Some(weight), Some(k)) =
+            (weights.get_mut(own).in_bounds(), points.as_ref().get(state).in_bounds())
+        else {
+            return;
+        };
         let bound = self.tableau_norm * minus_c.abs();
         // The first stage is sufficient in most cases.
         if !E::any(E::lt(*weight * k[0].abs(), bound)) {
@@ -180,7 +184,9 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for VelocityIncrements<'_, M,
         for k in k {
             size = k.abs().max(size);
         }
-        if let (Some(to), Some(increment)) = (sizes.get_mut(own), self.increment.as_ref().get(own)) {
+        if let (Some(to), Some(increment)) =
+            (sizes.get_mut(own).in_bounds(), self.increment.as_ref().get(own).in_bounds())
+        {
             *weight = (bound / size).max(*weight);
             let mut largest = E::from_f64(0.0);
             for [delta] in increment {
@@ -210,13 +216,13 @@ pub(in crate::irk) struct KinematicScales<'a, M: Plan, E: Plain, const S: usize>
 #[inline(always)]
 pub(in crate::irk) fn unknowns_of<M: Plan, T>(plan: M, of: &[T]) -> &[T] {
     let (first, end) = plan.facts().non_kinematic_range;
-    of.get(first..end).unwrap_or_default()
+    of.get(first..end).in_bounds().unwrap_or_default()
 }
 
 #[inline(always)]
 pub(in crate::irk) fn unknowns_of_mut<M: Plan, T>(plan: M, of: &mut [T]) -> &mut [T] {
     let (first, end) = plan.facts().non_kinematic_range;
-    of.get_mut(first..end).unwrap_or_default()
+    of.get_mut(first..end).in_bounds().unwrap_or_default()
 }
 
 /// The larger of two accumulators, or NaN.

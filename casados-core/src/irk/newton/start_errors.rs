@@ -9,7 +9,7 @@ use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 
 /// Values of an algebraic state that are tried if an equation is undefined at its start value.
 const TRIAL_VALUES: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
@@ -68,7 +68,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     fn find_algebraic(equation: usize, predicate: &mut dyn FnMut(usize) -> bool) -> Option<usize> {
         let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
         for entry in begin..end {
-            let Some((row, column)) = M::STRUCTURE.jacobian.get(entry) else { continue };
+            let Some((row, column)) = M::STRUCTURE.jacobian.get(entry).in_bounds() else { continue };
             let unknown = column.saturating_sub(M::Shape::NX);
             if row == equation && predicate(unknown) {
                 return Some(unknown);
@@ -82,7 +82,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     fn find_undefined_state(&mut self, equation: usize) -> Option<usize> {
         Self::find_algebraic(equation, &mut |unknown| {
             let variable = unknown + M::Shape::NX;
-            let Some(start) = self.points.as_ref().get(variable).copied() else { return false };
+            let Some(start) = self.points.as_ref().get(variable).in_bounds().copied() else { return false };
             let mut has_value = false;
             for value in TRIAL_VALUES {
                 self.set_perturbed_stage_variable(variable, [T::from_f64(value); S]);
@@ -109,7 +109,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     }
 
     fn set_perturbed_stage_variable(&mut self, variable: usize, value: [T; S]) {
-        if let Some(point) = self.points.as_mut().get_mut(variable) {
+        if let Some(point) = self.points.as_mut().get_mut(variable).in_bounds() {
             *point = value;
         }
     }

@@ -12,7 +12,7 @@ use crate::model::{Dae, VectorU, VectorX};
 use crate::quadrature::{OptionalIntegrand, finish_integrand, reset_integrand};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
-use crate::shape::Matrix;
+use crate::shape::{InBounds, Matrix};
 use crate::statistics::Statistics;
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
@@ -205,7 +205,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         }
         self.differentiated_step = Some(point.step);
         let h = context.workspace.last_inputs.time.step;
-        if let Some(step) = context.steps.get(point.step) {
+        if let Some(step) = context.steps.get(point.step).in_bounds() {
             point.evaluate(step, h, &mut forward.dense.dense)?;
         }
         point.differentiate::<_, W::Fallback>(h, forward)?;

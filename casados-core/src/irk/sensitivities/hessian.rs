@@ -11,7 +11,7 @@ use crate::model::{Dae, VectorU, VectorX, VectorZ};
 use crate::quadrature::{OptionalIntegrand, finish_integrand, reborrow, reset_integrand};
 use crate::result::Hessian;
 use crate::scalar::Real;
-use crate::shape::Matrix;
+use crate::shape::{InBounds, Matrix};
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Allocates the memory of `hessian`, so that its calls do not allocate.
@@ -121,7 +121,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let tape = self.run.invalidate_solution_on_error(W::hessian_tape(&mut self.hessian_tape, count))?;
         let context = self.run.run_steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            let Some(kept) = tape.get_mut(n) else { return Ok(()) };
+            let Some(kept) = tape.get_mut(n).in_bounds() else { return Ok(()) };
             let (at, to) = (StepIndex { n, count, prefetch_output }, &mut to.first.forward);
             forward.step::<_, false>(parts, at, Some(kept.stage_sensitivities_mut()), to)?;
             if let Some(integrand) = &mut integrand {

@@ -25,7 +25,7 @@ use crate::linalg::{Arithmetic, Kernel, axpy_compensated, dispatch, dot_compensa
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
-use crate::shape::Shape;
+use crate::shape::{InBounds, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Writes `ξ_i` to the points, and stores `δ_i` for
@@ -39,8 +39,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         let states = M::Shape::NX..2 * M::Shape::NX;
         let [beyond, _] = &mut self.variable_scratch;
         dispatch(PlaceCompensated {
-            points: self.points.as_mut().get_mut(states.clone()).unwrap_or_default(),
-            stage_compensation: beyond.as_mut().get_mut(states).unwrap_or_default(),
+            points: self.points.as_mut().get_mut(states.clone()).in_bounds().unwrap_or_default(),
+            stage_compensation: beyond.as_mut().get_mut(states).in_bounds().unwrap_or_default(),
             x: x.as_ref(),
             compensation: self.compensation.as_ref(),
             y: y.as_ref(),
@@ -59,7 +59,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
             if !(begin..end).contains(&c) {
                 continue;
             }
-            if let (Some(f), Some(beyond)) = (self.f.as_mut().get_mut(r), beyond.as_ref().get(c)) {
+            if let (Some(f), Some(beyond)) =
+                (self.f.as_mut().get_mut(r).in_bounds(), beyond.as_ref().get(c).in_bounds())
+            {
                 for ((f, value), beyond) in f.iter_mut().zip(values).zip(beyond) {
                     *f = *f + *value * *beyond;
                 }

@@ -14,7 +14,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::{Lanes, SideBySide, Strided};
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{InBounds, Matrix, Plain, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Writes `u` and `p`, which are constant in an interval.
@@ -238,10 +238,10 @@ impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for PlaceSt
         let (xdot, rest) = points.split_at_mut(nx);
         let (xi, rest) = rest.split_at_mut(nx);
         rest[..y.len() - nx].copy_from_slice(&y[nx..]);
-        let own_x = x.get(states.clone()).unwrap_or_default().iter();
+        let own_x = x.get(states.clone()).in_bounds().unwrap_or_default().iter();
         let (own_xdot, own_xi) = (xdot.get_mut(states.clone()), xi.get_mut(states.clone()));
         let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
-        let own_y = y.get(states.clone()).unwrap_or_default();
+        let own_y = y.get(states.clone()).in_bounds().unwrap_or_default();
         for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(states).zip(own_y) {
             if !(UNKNOWNS && (const { !has_no_kinematic_unknowns::<M>() }) && plan.kinematic(state).is_some())
             {
@@ -273,9 +273,12 @@ impl<M: Plan, E: Lanes, const S: usize> RowVisitor for Reconstruct<'_, M, E, S> 
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Some(k) = kinematic_derivative(self.plan, state, self.jacobian, self.points) else { return };
-        let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
+        let (Some(&x), Some(xdot)) = (self.x.get(state).in_bounds(), self.points.get_mut(state).in_bounds())
+        else {
+            return;
+        };
         *xdot = k;
-        if let Some(xi) = self.points.get_mut(self.plan.nx() + state) {
+        if let Some(xi) = self.points.get_mut(self.plan.nx() + state).in_bounds() {
             *xi = stage_values::<A, E, S>(x, &self.minus_ha, &k);
         }
     }

@@ -7,6 +7,7 @@
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Pivot, Supernode, Update};
 use crate::plan::Plan;
+use crate::shape::InBounds;
 
 // Unrolled loops are not compiled in unoptimised programs, where they would only be long, and in
 // firmware, where memory is scarcer than time.
@@ -139,7 +140,7 @@ pub fn pivots_backward<A: Arithmetic, M: Plan, V: PivotVisitor>(plan: M, visitor
     let mut index = all.len();
     while index > 0 {
         index -= 1;
-        if let Some(pivot) = all.get(index) {
+        if let Some(pivot) = all.get(index).in_bounds() {
             visitor.at::<A>(pivot, &[]);
         }
     }
@@ -204,7 +205,8 @@ fn visit_supernode<A: Arithmetic, M: Plan, V: SupernodeVisitor>(
     visitor: &mut V,
     supernode: &'static Supernode,
 ) {
-    let pivots = plan.structure().elimination.pivots.get(supernode.first as usize..).unwrap_or_default();
+    let pivots =
+        plan.structure().elimination.pivots.get(supernode.first as usize..).in_bounds().unwrap_or_default();
     match (supernode.count, pivots) {
         (4, [a, b, c, d, ..]) if const { has_supernode::<M>(4) } => visitor.at::<A, 4>([a, b, c, d]),
         (3, [a, b, c, ..]) if const { has_supernode::<M>(3) } => visitor.at::<A, 3>([a, b, c]),

@@ -1,6 +1,7 @@
 //! Inner loops over vectors.
 
 use crate::scalar::{Field, Lanes, Real};
+use crate::shape::InBounds;
 
 /// `y += a x`
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -15,7 +16,7 @@ pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
 pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     // Four accumulators, so that the compiler can vectorise.
     let mut sums = [T::ZERO; 4];
-    let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
+    let (a, b) = (a.get(..b.len()).in_bounds().unwrap_or(a), b);
     let (chunks, rest) = a.as_chunks::<4>();
     let (others, more) = b.as_chunks::<4>();
     for (a, b) in chunks.iter().zip(others) {

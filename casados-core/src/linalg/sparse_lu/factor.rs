@@ -21,7 +21,7 @@ use crate::linalg::kernel::unroll::{PivotVisitor, is_large_plan, pivots_forward}
 use crate::model::{Pivot, Structure, Update};
 use crate::plan::Plan;
 use crate::scalar::Field;
-use crate::shape::copy;
+use crate::shape::{InBounds, copy};
 
 /// The factors by the plan.
 pub struct PlannedFactors<'a, M, E, const S: usize> {
@@ -64,7 +64,7 @@ impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [Update]) {
         let blocks = &mut *self.blocks;
         if !pivot.identity {
-            let Some(block) = blocks.get_mut(pivot.block as usize) else { return };
+            let Some(block) = blocks.get_mut(pivot.block as usize).in_bounds() else { return };
             let inverse = inverse::<A, E, S>(block);
             A::write(block, &inverse);
             for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
@@ -76,10 +76,10 @@ impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
         // overlap.
         if const { S <= 2 } {
             for lower in pivot.lower() {
-                let Some(&lower) = blocks.get(lower) else { continue };
+                let Some(&lower) = blocks.get(lower).in_bounds() else { continue };
                 for (upper, target) in pivot.upper().zip(&mut updates) {
-                    let Some(&upper) = blocks.get(upper) else { continue };
-                    if let Some(block) = blocks.get_mut(target.block as usize) {
+                    let Some(&upper) = blocks.get(upper).in_bounds() else { continue };
+                    if let Some(block) = blocks.get_mut(target.block as usize).in_bounds() {
                         update::<A, M, E, S>(block, target, &lower, &upper);
                     }
                 }
@@ -89,7 +89,7 @@ impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
         // Updated blocks come after those of the pivot.
         let Some((own_blocks, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
         for lower in pivot.lower() {
-            let Some(&lower) = own_blocks.get(lower) else { continue };
+            let Some(&lower) = own_blocks.get(lower).in_bounds() else { continue };
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let (upper, block) =
                     (own_blocks.get(upper), later.get_mut((target.block - pivot.end) as usize));
@@ -131,11 +131,11 @@ pub const fn begins_with_update<M: Plan, E>() -> bool {
 /// Clears a block of fill-in, given by its row of the assembly.
 #[inline(always)]
 pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, zero: B) {
-    let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
+    let Some(entry) = plan.structure().elimination.assembly.get(row).in_bounds() else { return };
     if const { begins_with_update::<M, E>() } {
         return;
     }
-    if let Some(block) = blocks.get_mut(entry.block as usize) {
+    if let Some(block) = blocks.get_mut(entry.block as usize).in_bounds() {
         *block = zero;
     }
 }
@@ -153,6 +153,12 @@ pub fn blocks_with_slots<'a, M: Plan, E, const S: usize>(
     factors: PlannedFactors<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
-    let slots = factors.plan.structure().elimination.slots.get(range.clone()).unwrap_or_default();
-    factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
+    let slots = factors.plan.structure().elimination.slots.get(range.clone()).in_bounds().unwrap_or_default();
+    factors
+        .blocks
+        .get(range)
+        .in_bounds()
+        .unwrap_or_default()
+        .iter()
+        .zip(slots.iter().map(|&slot| slot as usize))
 }

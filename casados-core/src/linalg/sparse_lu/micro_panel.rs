@@ -3,7 +3,7 @@
 use crate::linalg::block::{PanelRow, subtract_product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
-use crate::shape::{Array, Plain};
+use crate::shape::{Array, InBounds, Plain};
 
 /// Loads a panel row. The caller has checked the slot, so that there is no branch here.
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -13,7 +13,7 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     column: usize,
 ) -> PanelRow<E, S, W> {
     let mut panel_row = [[E::from_f64(0.0); W]; S];
-    if let Some(row) = rows.get(slot) {
+    if let Some(row) = rows.get(slot).in_bounds() {
         for (panel_row, row) in panel_row.iter_mut().zip(row) {
             if let Some(columns) = row.chunk(column) {
                 *panel_row = *columns;
@@ -51,7 +51,7 @@ pub fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     column: usize,
 ) -> bool {
     for row in rows.get(slot).into_iter().flatten() {
-        for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
+        for element in row.as_ref().get(column..).in_bounds().unwrap_or_default().iter().take(W) {
             if *element != E::from_f64(0.0) {
                 return false;
             }
@@ -67,7 +67,7 @@ pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     column: usize,
     panel_row: &PanelRow<E, S, W>,
 ) {
-    if let Some(row) = rows.get_mut(slot) {
+    if let Some(row) = rows.get_mut(slot).in_bounds() {
         for (panel_row, row) in panel_row.iter().zip(row) {
             if let Some(columns) = row.chunk_mut(column) {
                 *columns = *panel_row;

@@ -15,7 +15,7 @@ use crate::linalg::kernel::unroll::{PivotVisitor, is_large_plan, pivots_backward
 use crate::model::{Pivot, Update};
 use crate::plan::Plan;
 use crate::scalar::Field;
-use crate::shape::{Array, Plain};
+use crate::shape::{Array, InBounds, Plain};
 use core::marker::PhantomData;
 
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot in all columns.
@@ -283,7 +283,9 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
             return;
         }
         let mut panel_row = load(rows, slot, *column);
-        for left in factors.plan.structure().elimination.left.get(pivot.left()).unwrap_or_default() {
+        for left in
+            factors.plan.structure().elimination.left.get(pivot.left()).in_bounds().unwrap_or_default()
+        {
             let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
             let (Some(block), Some(other)) = (block, other) else { continue };
             subtract_from_memory::<A, E, R, S, W>(&mut panel_row, block, other, *column);
@@ -299,7 +301,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         }
         let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
-            let Some(other) = rows.get(other) else { continue };
+            let Some(other) = rows.get(other).in_bounds() else { continue };
             subtract_from_memory::<A, E, R, S, W>(&mut panel_row, block, other, *column);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {

@@ -13,7 +13,7 @@ use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::model::Pivot;
 use crate::plan::Plan;
 use crate::scalar::Field;
-use crate::shape::{Array, Plain};
+use crate::shape::{Array, InBounds, Plain};
 
 impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
     Substitution<'_, M, E, R, V, S, W>
@@ -73,8 +73,9 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         if slot >= rows.len() || pivot.lower().is_empty() {
             return;
         }
-        let mut slots = factors.plan.structure().elimination.slots.get(pivot.lower()).unwrap_or_default();
-        let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
+        let mut slots =
+            factors.plan.structure().elimination.slots.get(pivot.lower()).in_bounds().unwrap_or_default();
+        let mut blocks = factors.blocks.get(pivot.lower()).in_bounds().unwrap_or_default();
         let mut panel_row = load::<E, R, S, W>(rows, slot, *column);
         let mut accumulator = [[E::from_f64(0.0); W]; S];
         while let Some((rest, [block, last])) = blocks.split_last_chunk()

@@ -11,7 +11,7 @@ use crate::linalg::sparse_lu::solve;
 use crate::model::{ArrayK, Dae};
 use crate::plan::Known;
 use crate::scalar::Real;
-use crate::shape::{Aligned, Plain, Shape};
+use crate::shape::{Aligned, InBounds, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -246,7 +246,7 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
         let plan = &M::STRUCTURE.elimination;
         let square = *scale * *scale;
         for entry in plan.assembly {
-            let Some([[to]]) = blocks.get_mut(entry.block as usize) else { continue };
+            let Some([[to]]) = blocks.get_mut(entry.block as usize).in_bounds() else { continue };
             let mut element = if entry.first { Complex::zero() } else { *to };
             // Absent entries have an index outside of the Jacobian.
             if let Some(&(mut value)) = jacobian.get(entry.entry as usize) {

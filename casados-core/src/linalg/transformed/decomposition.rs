@@ -2,6 +2,7 @@
 //! once for all numbers of stages. Matrices are in row-major order.
 
 use super::complex::Complex;
+use crate::shape::InBounds;
 use bytemuck::Zeroable;
 
 /// One complex number.
@@ -32,12 +33,12 @@ pub(super) struct DecompositionMemory<'a> {
 /// Returns an element, or zero outside, so that nothing can panic; the optimiser cannot prove that
 /// all indices are inside.
 fn get_or_zero<T: Copy + Zeroable>(elements: &[T], index: usize) -> T {
-    elements.get(index).copied().unwrap_or(T::zeroed())
+    elements.get(index).in_bounds().copied().unwrap_or(T::zeroed())
 }
 
 /// Sets an element.
 fn set_if_inside<T>(elements: &mut [T], index: usize, value: T) {
-    if let Some(element) = elements.get_mut(index) {
+    if let Some(element) = elements.get_mut(index).in_bounds() {
         *element = value;
     }
 }

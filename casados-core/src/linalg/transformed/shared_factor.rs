@@ -13,7 +13,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
-use crate::shape::Aligned;
+use crate::shape::{Aligned, InBounds};
 use bytemuck::Zeroable;
 
 /// Factors of the shared Jacobian for all eigenvalues, by the plan; for Newton increments, which
@@ -120,11 +120,11 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> RowVisitor
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Self { plan, jacobian, blocks, .. } = self;
-        let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
+        let Some(entry) = plan.structure().elimination.assembly.get(row).in_bounds() else { return };
         if const { factor::begins_with_update::<M, DemotedComplex<E, S>>() } && entry.is_fill() {
             return;
         }
-        let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
+        let Some([[to]]) = blocks.get_mut(entry.block as usize).in_bounds() else { return };
         let [scale, square] = self.scales;
         let mut element = if entry.first { Complex::zero() } else { *to };
         // Absent entries have an index outside of the Jacobian.

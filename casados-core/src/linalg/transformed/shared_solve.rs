@@ -16,6 +16,7 @@ use crate::linalg::sparse_lu::factor::has_all_blocks;
 use crate::model::Pivot;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
+use crate::shape::InBounds;
 
 /// Transforms the residuals and solves with `I + L`; solves with `P + U` and transforms the
 /// solution back.
@@ -75,29 +76,33 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for ForwardSubstitution
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let mut sums = [Complex::zero(); P];
         for (sum, pivot) in sums.iter_mut().zip(pivots) {
-            if let Some(f) = self.f.get(pivot.equation as usize) {
+            if let Some(f) = self.f.get(pivot.equation as usize).in_bounds() {
                 *sum = demote(self.basis.transform::<A>(f));
             }
         }
-        for left in self.plan.structure().elimination.left.get(pivots[0].left()).unwrap_or_default() {
+        for left in
+            self.plan.structure().elimination.left.get(pivots[0].left()).in_bounds().unwrap_or_default()
+        {
             // Blocks of the rows of a supernode are adjacent.
             let blocks = self.blocks.get(left.block as usize..).and_then(|blocks| blocks.first_chunk::<P>());
-            let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize)) else { continue };
+            let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize).in_bounds()) else {
+                continue;
+            };
             for (sum, block) in sums.iter_mut().zip(blocks) {
                 *sum = A::subtract(*sum, *block, *row);
             }
         }
         for (index, pivot) in pivots.into_iter().enumerate() {
             let sum = sums[index];
-            let below = self.blocks.get(pivot.block as usize..).unwrap_or_default();
+            let below = self.blocks.get(pivot.block as usize..).in_bounds().unwrap_or_default();
             // A constant range, which the optimiser unrolls.
             #[allow(clippy::needless_range_loop)]
             for other in index + 1..P {
-                if let Some(block) = below.get(other - index) {
+                if let Some(block) = below.get(other - index).in_bounds() {
                     sums[other] = A::subtract(sums[other], *block, sum);
                 }
             }
-            if let Some(row) = self.rows.get_mut(pivot.slot as usize) {
+            if let Some(row) = self.rows.get_mut(pivot.slot as usize).in_bounds() {
                 *row = sum;
             }
         }
@@ -109,7 +114,8 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for BackSubstitution<'_
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let common_columns = pivots[P - 1].upper();
-        let slots = self.plan.structure().elimination.slots.get(common_columns).unwrap_or_default();
+        let slots =
+            self.plan.structure().elimination.slots.get(common_columns).in_bounds().unwrap_or_default();
         let (mut sums, mut own): (_, [&[DemotedComplex<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
         let mut triangle = own;
         for (index, pivot) in pivots.into_iter().enumerate() {
@@ -122,9 +128,9 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for BackSubstitution<'_
             (sums[index], own[index], triangle[index]) = (*row, blocks, others);
         }
         for (index, &slot) in slots.iter().enumerate() {
-            let Some(row) = self.rows.get(slot as usize) else { continue };
+            let Some(row) = self.rows.get(slot as usize).in_bounds() else { continue };
             for (sum, own) in sums.iter_mut().zip(own) {
-                if let Some(block) = own.get(index) {
+                if let Some(block) = own.get(index).in_bounds() {
                     *sum = A::subtract(*sum, *block, *row);
                 }
             }
@@ -136,14 +142,14 @@ impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for BackSubstitution<'_
             }
             let (sum, slot) = (sums[index], pivot.slot as usize);
             for (other, triangle) in sums[..index].iter_mut().zip(triangle) {
-                if let Some(block) = triangle.get(P - 1 - index) {
+                if let Some(block) = triangle.get(P - 1 - index).in_bounds() {
                     *other = A::subtract(*other, *block, sum);
                 }
             }
-            if let Some(row) = self.rows.get_mut(slot) {
+            if let Some(row) = self.rows.get_mut(slot).in_bounds() {
                 *row = sum;
             }
-            if let Some(solution) = self.solution.get_mut(slot) {
+            if let Some(solution) = self.solution.get_mut(slot).in_bounds() {
                 let sum = Complex { parts: sum.parts.map(E::promote) };
                 solution.as_flattened_mut().copy_from_slice(&self.basis.transform_back::<A>(&sum));
             }

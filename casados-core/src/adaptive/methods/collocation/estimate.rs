@@ -1,6 +1,7 @@
 //! The error estimates of a step.
 
 use super::*;
+use crate::shape::InBounds;
 
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// The larger of the two error estimates, from the defect at the current point.
@@ -18,7 +19,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     ) -> Result<f64, NewtonFailure> {
         self.estimate_from_defect(start.h, residuals)?;
         let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
-        let errors = self.memory.error_estimate.as_ref().get(..counted).unwrap_or_default();
+        let errors = self.memory.error_estimate.as_ref().get(..counted).in_bounds().unwrap_or_default();
         let first = norm(errors, start.estimator_scale.as_ref());
         let larger = self.second_estimate(first, start);
         if at_end || !start.derivatives_are_known || larger <= first.max(SAFE_ESTIMATE) {

@@ -11,7 +11,7 @@ use crate::memory::allocate;
 use crate::model::{ArrayX, Dae, Ode};
 use crate::result::Dense;
 use crate::scalar::{Real, Scalar};
-use crate::shape::{Array, Matrix, Shape};
+use crate::shape::{Array, InBounds, Matrix, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
@@ -313,7 +313,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> ExplicitStepper<M, T> 
         } = &mut *self.memory;
         let last = core::slice::from_ref(&*end_slope);
         for index in 0..B::DENSE_STAGES.len().min(more.len()) {
-            let Some(stage) = B::DENSE_STAGES.get(index) else { break };
+            let Some(stage) = B::DENSE_STAGES.get(index).in_bounds() else { break };
             x.as_mut().fill(T::ZERO);
             weighted_stage_sum(&stage.stages, &record.k, x.as_mut());
             weighted_stage_sum(&[stage.end_coefficient], last, x.as_mut());
