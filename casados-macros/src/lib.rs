@@ -18,7 +18,7 @@ use proc_macro::TokenStream;
 /// Stack size of the thread that expands a model, in bytes; untouched pages use no memory. An
 /// unoptimised parser takes up to 23 kB per nesting level; [`language::tokens::check`] limits the
 /// levels.
-const STACK: usize = 1 << 29;
+const STACK_BYTES: usize = 1 << 29;
 
 /// A differential-algebraic model `0 = f(ẋ, x, u, z, p, t)`.
 ///
@@ -125,7 +125,7 @@ fn expand(
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
     // Long sums, chains of methods and `else if` nest deeply in the syntax tree.
-    stacker::grow(STACK, || expand_on_thread(form, attribute, item))
+    stacker::grow(STACK_BYTES, || expand_on_thread(form, attribute, item))
 }
 
 fn expand_on_thread(

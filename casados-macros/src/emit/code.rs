@@ -197,7 +197,7 @@ fn functions_as_text(model: &Model, derivatives: &Derivatives, names: &Names) ->
 }
 
 /// The width of panels of directions.
-const PANEL: usize = 8;
+const PANEL_WIDTH: usize = 8;
 
 /// `NK`, `NV`, `NW` and `NC`.
 pub fn dimensions(variables: &Variables) -> [usize; 4] {
@@ -209,5 +209,5 @@ pub fn dimensions(variables: &Variables) -> [usize; 4] {
 
 /// `NC` for `nw` directions: whole panels.
 pub fn panel_columns(nw: usize) -> usize {
-    nw.next_multiple_of(PANEL)
+    nw.next_multiple_of(PANEL_WIDTH)
 }

@@ -15,9 +15,9 @@
 //! (2004).
 
 /// Significant bits of a double.
-const DIGITS: u32 = f64::MANTISSA_DIGITS;
+const MANTISSA_BITS: u32 = f64::MANTISSA_DIGITS;
 /// Quotients within this many units of `1/(2ᵏ C)` of a midpoint are verified.
-const CLOSE: u128 = 64;
+const HARD_CASE_DISTANCE: u128 = 64;
 
 /// `[h, l]`, if quotients by `c` are bitwise equal.
 pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
@@ -52,15 +52,15 @@ pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
 /// `2ᵏ X = d` modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of
 /// `2ᵏ`.)
 fn hard_cases(c: f64) -> impl Iterator<Item = f64> {
-    let digits = u128::from(c.to_bits() & ((1 << (DIGITS - 1)) - 1) | 1 << (DIGITS - 1));
+    let digits = u128::from(c.to_bits() & ((1 << (MANTISSA_BITS - 1)) - 1) | 1 << (MANTISSA_BITS - 1));
     let twos = digits.trailing_zeros();
     let odd = digits >> twos;
-    [DIGITS, DIGITS + 1].into_iter().flat_map(move |k| {
+    [MANTISSA_BITS, MANTISSA_BITS + 1].into_iter().flat_map(move |k| {
         let inverse = power(odd.div_ceil(2), k - twos, odd);
-        (1..=CLOSE).filter(move |d| d.trailing_zeros() >= twos).flat_map(move |d| {
+        (1..=HARD_CASE_DISTANCE).filter(move |d| d.trailing_zeros() >= twos).flat_map(move |d| {
             let above = (d >> twos) * inverse % odd;
             [above, odd - above].into_iter().flat_map(move |first| {
-                let least = 1_u128 << (DIGITS - 1);
+                let least = 1_u128 << (MANTISSA_BITS - 1);
                 let begin = first + least.saturating_sub(first).div_ceil(odd) * odd;
                 (begin..2 * least).step_by(odd as usize).map(|x| x as f64)
             })
@@ -127,11 +127,14 @@ mod tests {
             };
             let hard: Vec<f64> = hard_cases(c).collect();
             for &x in &hard {
-                assert!(distance(x as u128) <= Some(CLOSE), "{x} / {c:e}");
+                assert!(distance(x as u128) <= Some(HARD_CASE_DISTANCE), "{x} / {c:e}");
             }
             for _ in 0..1000 {
                 let x = random(&mut state) >> 11 | 1 << 52;
-                assert!(hard.contains(&(x as f64)) || distance(u128::from(x)) > Some(CLOSE), "{x} / {c:e}");
+                assert!(
+                    hard.contains(&(x as f64)) || distance(u128::from(x)) > Some(HARD_CASE_DISTANCE),
+                    "{x} / {c:e}"
+                );
             }
         }
     }

@@ -52,7 +52,7 @@ impl Routine<'_> {
         for node in steps.iter().flat_map(|&step| chunk::read(graph, &outputs, step)) {
             uses[node.at()] += 1;
         }
-        let writer = Writer {
+        let writer = RoutineWriter {
             routine: self,
             graph,
             variables,
@@ -69,14 +69,15 @@ impl Routine<'_> {
         writer.write_driver(&mut text, &plan);
         for (number, piece) in plan.chunks.iter().enumerate() {
             let in_place = writer.read_in_place(&steps[piece.steps.clone()], piece);
-            Writer { in_place, ..writer.clone() }.write_piece(&mut text, number, &steps, piece, plan.slots);
+            RoutineWriter { in_place, ..writer.clone() }
+                .write_piece(&mut text, number, &steps, piece, plan.slots);
         }
         text
     }
 }
 
 #[derive(Clone)]
-struct Writer<'a> {
+struct RoutineWriter<'a> {
     routine: &'a Routine<'a>,
     graph: &'a Graph,
     variables: &'a Variables,
@@ -90,7 +91,7 @@ struct Writer<'a> {
     in_place: HashMap<Node, usize>,
 }
 
-impl Writer<'_> {
+impl RoutineWriter<'_> {
     /// The arguments of a piece: name and type, with or without a lifetime. Tables are values of
     /// types of size zero.
     fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(String, String)> {

@@ -26,7 +26,7 @@ pub enum Order {
 
 /// A linearised graph. Vertices are in topological order: variables, intermediates, outputs.
 #[derive(Clone, Debug, Default)]
-pub struct Linearised {
+pub struct LinearisedGraph {
     /// The edges into each vertex: source and derivative.
     pub into: Vec<BTreeMap<u32, Node>>,
     /// The edges out of each vertex: target.
@@ -35,7 +35,7 @@ pub struct Linearised {
     pub arcs: Vec<BTreeMap<u32, Node>>,
 }
 
-impl Linearised {
+impl LinearisedGraph {
     /// A graph without edges.
     pub fn new(vertices: usize) -> Self {
         Self {

@@ -2,14 +2,14 @@
 
 use std::hash::{BuildHasherDefault, Hasher};
 
-pub type BuildHasher = BuildHasherDefault<Multiply>;
+pub type BuildHasher = BuildHasherDefault<MultiplyHasher>;
 
 /// Multiplies word by word and folds the upper half of the product onto the lower one: constants
 /// such as small integers differ in their upper bits only.
 #[derive(Clone, Default)]
-pub struct Multiply(u64);
+pub struct MultiplyHasher(u64);
 
-impl Hasher for Multiply {
+impl Hasher for MultiplyHasher {
     fn finish(&self) -> u64 {
         self.0
     }

@@ -1,6 +1,6 @@
 //! The sparse Hessian of `μᵀ f`.
 
-use super::elimination::{Linearised, Order};
+use super::elimination::{LinearisedGraph, Order};
 use super::jacobian::{VertexNumbering, cheapest_order};
 use super::reverse::adjoints;
 use super::{Entry, Graph, Node};
@@ -49,7 +49,7 @@ pub fn hessian_in_order(
     }
     let nodes: Vec<Node> = (0..active.len() as u32).map(Node).filter(|node| needed[node.at()]).collect();
     let vertices = VertexNumbering::new(graph, &nodes, variables, active.len());
-    let mut linearised = Linearised::new(vertices.count as usize);
+    let mut linearised = LinearisedGraph::new(vertices.count as usize);
     for &node in &nodes {
         for (operand, partial) in graph.partials(node, is_active).into_iter().flatten() {
             linearised.add_edge(graph, vertices.of(operand), vertices.of(node), partial);

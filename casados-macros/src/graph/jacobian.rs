@@ -1,6 +1,6 @@
 //! The sparse Jacobian.
 
-use super::elimination::{Linearised, Order};
+use super::elimination::{LinearisedGraph, Order};
 use super::{Entry, Graph, Node, Op};
 
 /// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to
@@ -53,7 +53,7 @@ pub fn jacobian_in_order(
     let active = graph.active_nodes(outputs.iter().copied(), variables);
     let nodes: Vec<Node> = graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
     let vertices = VertexNumbering::new(graph, &nodes, variables, active.len());
-    let mut linearised = Linearised::new(vertices.count as usize + outputs.len());
+    let mut linearised = LinearisedGraph::new(vertices.count as usize + outputs.len());
     for &node in &nodes {
         for (operand, partial) in graph.partials(node, |operand| active[operand.at()]).into_iter().flatten() {
             linearised.add_edge(graph, vertices.of(operand), vertices.of(node), partial);

@@ -200,8 +200,8 @@ impl Evaluator {
         };
         match builtin.path.as_slice() {
             _ if builtin.owner.is_some() => true,
-            [first, _, ..] if CRATES.contains(&first.as_str()) => true,
-            [of, _] if TRAITS.contains(&of.as_str()) => true,
+            [first, _, ..] if METHOD_CRATES.contains(&first.as_str()) => true,
+            [of, _] if METHOD_TRAITS.contains(&of.as_str()) => true,
             [.., of, _] => is_seen(of),
             _ => false,
         }
@@ -306,12 +306,12 @@ impl Evaluator {
 }
 
 /// Crates whose functions are treated as methods.
-const CRATES: &[&str] =
+const METHOD_CRATES: &[&str] =
     &["core", "std", "alloc", "nalgebra", "na", "simba", "num_traits", "num_dual", "libm", "casados"];
 
 /// Traits of the language and of those crates whose methods are called by path.
 #[rustfmt::skip]
-const TRAITS: &[&str] = &[
+const METHOD_TRAITS: &[&str] = &[
     "Add", "Sub", "Mul", "Div", "Rem", "Neg", "Not", "AddAssign", "SubAssign", "MulAssign", "DivAssign",
     "RemAssign", "Index", "IndexMut", "PartialEq", "PartialOrd", "Eq", "Ord", "Clone", "Copy", "Default",
     "From", "Into", "TryFrom", "TryInto", "AsRef", "AsMut", "Borrow", "ToOwned", "Iterator", "IntoIterator",

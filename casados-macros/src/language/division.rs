@@ -9,15 +9,15 @@ use syn::visit::{self, Visit};
 /// Items that cause a compiler warning at each such division: on stable toolchains a macro can warn
 /// only by the use of deprecated items.
 pub fn warnings(item: &syn::Item) -> TokenStream {
-    let mut divisions = Divisions(Vec::new());
+    let mut divisions = LossyDivisions(Vec::new());
     divisions.visit_item(item);
     divisions.0.into_iter().map(warning).collect()
 }
 
 /// A division: its operator and its operands.
-type Division = (Span, i128, i128);
+type LossyDivision = (Span, i128, i128);
 
-fn warning((operator, a, b): Division) -> TokenStream {
+fn warning((operator, a, b): LossyDivision) -> TokenStream {
     let quotient = a / b;
     let note =
         format!("`{a} / {b}` is a division of integers, whose value is {quotient}: write `{a}.0 / {b}.0`");
@@ -32,9 +32,9 @@ fn warning((operator, a, b): Division) -> TokenStream {
     }
 }
 
-struct Divisions(Vec<Division>);
+struct LossyDivisions(Vec<LossyDivision>);
 
-impl<'ast> Visit<'ast> for Divisions {
+impl<'ast> Visit<'ast> for LossyDivisions {
     fn visit_expr_cast(&mut self, cast: &'ast syn::ExprCast) {
         if let syn::Type::Path(ty) = &*cast.ty
             && ty.path.is_ident("f64")

@@ -97,7 +97,7 @@ pub struct Evaluator {
     /// Whether the current pattern is irrefutable, so that its names are variables.
     pub(super) irrefutable: bool,
     /// The changes within the branches in execution.
-    journals: Vec<Journal>,
+    journals: Vec<ChangeJournal>,
     numbers: HashMap<String, u32>,
     steps: usize,
     depth: usize,
@@ -116,7 +116,7 @@ pub enum Target {
 
 /// Changed variables, with their old values.
 #[derive(Default)]
-struct Journal {
+struct ChangeJournal {
     entries: Vec<(Cell, Value)>,
     seen: HashSet<*const std::cell::RefCell<Value>>,
 }
@@ -192,7 +192,7 @@ impl Evaluator {
         &mut self,
         execute: impl FnOnce(&mut Self) -> Evaluated<T>,
     ) -> Evaluated<(T, Changes)> {
-        self.journals.push(Journal::default());
+        self.journals.push(ChangeJournal::default());
         let result = execute(self);
         let journal = self.journals.pop().unwrap_or_default();
         let value = result?;

@@ -13,7 +13,7 @@ use syn::spanned::Spanned;
 use syn::{Error, Expr, Result, Token};
 
 /// The possible arguments of `index_reduction`.
-const POSSIBLE: &str = "write `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])` with a decay rate for the \
+const POSSIBLE_ARGUMENTS: &str = "write `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])` with a decay rate for the \
     constraint and each of its derivatives, `index_reduction(baumgarte = 2.0)` with one rate, or \
     `index_reduction(projection)`";
 
@@ -44,28 +44,30 @@ impl Reduction {
     pub fn read(span: Span, input: ParseStream) -> Result<Self> {
         if !input.peek(syn::token::Paren) {
             if !input.is_empty() && !input.peek(Token![,]) {
-                return Err(Error::new(input.span(), POSSIBLE));
+                return Err(Error::new(input.span(), POSSIBLE_ARGUMENTS));
             }
             return Ok(Self { span, rates: Rates::None, projection: false });
         }
         let content;
         syn::parenthesized!(content in input);
-        let word: Ident = content.parse().map_err(|error| Error::new(error.span(), POSSIBLE))?;
+        let word: Ident = content.parse().map_err(|error| Error::new(error.span(), POSSIBLE_ARGUMENTS))?;
         if word == "projection" && content.is_empty() {
             return Ok(Self { span, rates: Rates::None, projection: true });
         }
         if word != "baumgarte" {
-            return Err(Error::new(word.span(), POSSIBLE));
+            return Err(Error::new(word.span(), POSSIBLE_ARGUMENTS));
         }
-        content.parse::<Token![=]>().map_err(|error| Error::new(error.span(), POSSIBLE))?;
+        content.parse::<Token![=]>().map_err(|error| Error::new(error.span(), POSSIBLE_ARGUMENTS))?;
         let rates = match content.parse::<Expr>()? {
-            Expr::Array(list) if list.elems.is_empty() => return Err(Error::new(list.span(), POSSIBLE)),
+            Expr::Array(list) if list.elems.is_empty() => {
+                return Err(Error::new(list.span(), POSSIBLE_ARGUMENTS));
+            }
             Expr::Array(list) => Rates::Each(list.elems.iter().map(rate).collect::<Result<_>>()?),
             one => Rates::All(rate(&one)?),
         };
         content.parse::<Option<Token![,]>>()?;
         if !content.is_empty() {
-            return Err(Error::new(content.span(), POSSIBLE));
+            return Err(Error::new(content.span(), POSSIBLE_ARGUMENTS));
         }
         Ok(Self { span, rates, projection: false })
     }

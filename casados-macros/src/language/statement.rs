@@ -242,7 +242,7 @@ impl Evaluator {
             "panic" | "unreachable" | "todo" | "unimplemented" => {
                 let message = match list.parse2(tokens) {
                     Ok(arguments) => assertion_message(&arguments, 0),
-                    Err(_) => REACHED.to_owned(),
+                    Err(_) => DEFAULT_PANIC_MESSAGE.to_owned(),
                 };
                 Err(error(call, message).into())
             }
@@ -327,13 +327,13 @@ fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
 }
 
 /// The error of a `panic!` without a message.
-const REACHED: &str = "this is reached when the macro evaluates the model";
+const DEFAULT_PANIC_MESSAGE: &str = "this is reached when the macro evaluates the model";
 
 /// The user's message of a failed assertion, or a default one.
 fn assertion_message(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
     match arguments.get(position) {
         Some(Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. })) => text.value(),
-        _ if position == 0 => REACHED.to_owned(),
+        _ if position == 0 => DEFAULT_PANIC_MESSAGE.to_owned(),
         _ => {
             let text = arguments.first().map(|a| a.to_token_stream().to_string()).unwrap_or_default();
             format!("this assertion does not hold: `{text}`")

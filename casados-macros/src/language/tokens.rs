@@ -11,7 +11,7 @@ const MAX_NESTING: usize = 256;
 
 /// Maximum number of tokens of one statement or element; each may be a level of the syntax tree
 /// (prefix signs, `else if`, method calls).
-const LENGTH: usize = 20_000;
+const MAX_STATEMENT_TOKENS: usize = 20_000;
 
 /// Maximum number of terms of a sum without parentheses: half of what the compiler supports.
 const MAX_SUM_TERMS: usize = 4096;
@@ -67,9 +67,9 @@ impl Level {
                 TokenTree::Punct(punct) if matches!(punct.as_char(), '+' | '-') => terms += 1,
                 _ => {}
             }
-            if length > LENGTH || terms > MAX_SUM_TERMS {
+            if length > MAX_STATEMENT_TOKENS || terms > MAX_SUM_TERMS {
                 let message = format!(
-                    "this expression has more than {MAX_SUM_TERMS} terms or {LENGTH} tokens without brackets as far as here: \
+                    "this expression has more than {MAX_SUM_TERMS} terms or {MAX_STATEMENT_TOKENS} tokens without brackets as far as here: \
                      split it into statements, functions or loops"
                 );
                 return Err(syn::Error::new(token.span(), message));

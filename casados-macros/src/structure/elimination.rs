@@ -63,11 +63,11 @@ impl Complex {
 
 /// Pivot thresholds: a pivot is acceptable if at every sample it is at least this fraction of the
 /// largest entry of its column (rows scaled to a largest entry of one).
-const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
+const PIVOT_THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
 
 /// A column vanishes at rest if all its entries are below this, with rows scaled to a largest entry
 /// of one: the matrix is singular there.
-const VANISHING: f64 = 1e-10;
+const VANISHING_COLUMN_TOLERANCE: f64 = 1e-10;
 
 /// The matrix during elimination.
 struct ActiveMatrix {
@@ -75,8 +75,8 @@ struct ActiveMatrix {
     rows: Vec<BTreeMap<u32, (Vec<Complex>, bool)>>,
     /// The rows with an entry in each column.
     columns: Vec<Vec<u32>>,
-    done_rows: Vec<bool>,
-    done_columns: Vec<bool>,
+    eliminated_rows: Vec<bool>,
+    eliminated_columns: Vec<bool>,
     /// 1 / largest entry of each row at each sample, at the start.
     scales: Vec<Vec<f64>>,
     /// The length of the chain of pivots on which each row depends.
@@ -91,8 +91,8 @@ impl ActiveMatrix {
         let mut active = Self {
             rows: vec![BTreeMap::new(); size],
             columns: vec![Vec::new(); size],
-            done_rows: vec![false; size],
-            done_columns: vec![false; size],
+            eliminated_rows: vec![false; size],
+            eliminated_columns: vec![false; size],
             scales: vec![vec![0.0; samples]; size],
             depths: vec![0; size],
             at_rest: samples.saturating_sub(at_rest),
@@ -120,7 +120,7 @@ impl ActiveMatrix {
                 .iter()
                 .map(|&r| self.rows[r as usize][&column].0[k].abs() * self.scales[r as usize][k])
                 .fold(0.0, f64::max);
-            if k >= self.at_rest && !(largest > VANISHING && largest.is_finite()) {
+            if k >= self.at_rest && !(largest > VANISHING_COLUMN_TOLERANCE && largest.is_finite()) {
                 continue;
             }
             // A column that vanishes, or an entry that is tiny in its own row, is no pivot either.
@@ -138,14 +138,14 @@ impl ActiveMatrix {
     /// in order.
     fn choose(&self) -> Option<(u32, u32)> {
         let mut candidates: Vec<(u64, bool, u32, u32, u32)> = Vec::new();
-        for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.done_rows[*row]) {
+        for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.eliminated_rows[*row]) {
             for (&column, (_, trivial)) in entries {
                 let cost = (entries.len() as u64 - 1) * (self.columns[column as usize].len() as u64 - 1);
                 candidates.push((cost, !trivial, self.depths[row], row as u32, column));
             }
         }
         candidates.sort_unstable();
-        for threshold in THRESHOLDS {
+        for threshold in PIVOT_THRESHOLDS {
             // At the last threshold every non-zero pivot is acceptable: the best one.
             if threshold == 0.0 {
                 return candidates
@@ -191,8 +191,8 @@ impl ActiveMatrix {
             self.columns[c as usize].retain(|&r| r != row);
         }
         self.columns[column as usize].clear();
-        self.done_rows[row as usize] = true;
-        self.done_columns[column as usize] = true;
+        self.eliminated_rows[row as usize] = true;
+        self.eliminated_columns[column as usize] = true;
         (lower, upper)
     }
 }

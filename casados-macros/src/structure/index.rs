@@ -4,7 +4,7 @@ use crate::graph::Entry;
 use crate::language::Model;
 
 /// The wording of errors about equations and unknowns without a matching.
-pub struct Words<'a> {
+pub struct MatchingErrorText<'a> {
     /// The name of an unknown.
     pub name: &'a dyn Fn(usize) -> String,
     /// What an equation without unknowns lacks.
@@ -38,12 +38,12 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
          undetermined unknowns"
     );
     let nothing = "neither a derivative nor an algebraic state";
-    matching(model, &rows, &Words { name: &name, nothing, conclusion: &conclusion })
+    matching(model, &rows, &MatchingErrorText { name: &name, nothing, conclusion: &conclusion })
 }
 
 /// Returns an error if no matching of equations to unknowns exists in the pattern `rows`. It names
 /// the over- and underdetermined parts (the Dulmage-Mendelsohn decomposition).
-pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Result<()> {
+pub fn matching(model: &Model, rows: &[Vec<usize>], words: &MatchingErrorText) -> syn::Result<()> {
     let count = rows.len();
     let matching = maximum_matching(rows, count);
     if matching.iter().all(Option::is_some) {

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// The number of sample points, and the maximum number of draws: the model may have no finite value
 /// at some points.
-const POINTS: usize = 12;
+const SAMPLE_POINTS: usize = 12;
 const MAX_DRAWS: usize = 200;
 
 /// A structural non-zero of the Newton matrix: a sum of terms.
@@ -54,7 +54,7 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
     let points = Points { graph, nodes, samplings, constants: constants(&mut random, opaque) };
     let mut found = Vec::new();
     for draw in 0..MAX_DRAWS {
-        if found.len() == POINTS {
+        if found.len() == SAMPLE_POINTS {
             break;
         }
         let values = points.point_values(&mut random, draw);
@@ -93,7 +93,7 @@ pub fn sample(
     };
     let mut found = 0;
     for draw in 0..MAX_DRAWS {
-        if found == POINTS {
+        if found == SAMPLE_POINTS {
             break;
         }
         let values = points.point_values(&mut random, draw);
@@ -116,8 +116,8 @@ fn append_sample(
     values: &[f64],
     random: &mut Random,
 ) -> usize {
-    const SIZES: usize = 2;
-    for _ in 0..SIZES {
+    const STEP_SIZE_SAMPLES: usize = 2;
+    for _ in 0..STEP_SIZE_SAMPLES {
         // The eigenvalues of A are in the right half-plane; the step size is arbitrary.
         let size = 10f64.powf(random.between(-4.0, 0.0));
         let angle = random.between(-1.4, 1.4);
@@ -133,7 +133,7 @@ fn append_sample(
             entry.values.push(value);
         }
     }
-    SIZES
+    STEP_SIZE_SAMPLES
 }
 
 /// Random values for constants from outside.

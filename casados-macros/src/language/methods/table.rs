@@ -11,7 +11,7 @@ use std::rc::Rc;
 use syn::Result;
 
 /// The degree of cubic splines, and of tables that may be one.
-const CUBIC: u8 = 3;
+const CUBIC_DEGREE: u8 = 3;
 
 /// A table by its type and constructor: the numbers of variables and of the constructor's
 /// arguments, and the degree.
@@ -19,9 +19,9 @@ fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
     Some(match (ty, function) {
         ("Linear", "new") => ("Linear", 1, 2, 1),
         ("Linear2", "new") => ("Linear2", 2, 3, 1),
-        ("Spline", "natural" | "not_a_knot") => ("Spline", 1, 2, CUBIC),
-        ("Spline", "clamped") => ("Spline", 1, 3, CUBIC),
-        ("Spline2", "natural" | "not_a_knot") => ("Spline2", 2, 3, CUBIC),
+        ("Spline", "natural" | "not_a_knot") => ("Spline", 1, 2, CUBIC_DEGREE),
+        ("Spline", "clamped") => ("Spline", 1, 3, CUBIC_DEGREE),
+        ("Spline2", "natural" | "not_a_knot") => ("Spline2", 2, 3, CUBIC_DEGREE),
         _ => return None,
     })
 }
@@ -119,7 +119,7 @@ pub fn method(evaluator: &mut Evaluator, of: &Interpolation, call: &Call) -> Res
 
 /// A method of a constant defined outside of the macro's input.
 pub fn opaque_table_method(evaluator: &mut Evaluator, of: &TokenStream, call: &Call) -> Result<Value> {
-    let value = evaluate_table(evaluator, of, CUBIC, call)?;
+    let value = evaluate_table(evaluator, of, CUBIC_DEGREE, call)?;
     value.ok_or_else(|| error(call.at, "a table has one or two variables"))
 }
 

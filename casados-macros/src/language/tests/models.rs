@@ -60,7 +60,7 @@ fn nested_models() {
 fn sums_of_thousands_of_terms() {
     let terms: Vec<String> = (0..3000).map(|i| format!("{i}.5 * x[{}]", i % 6)).collect();
     let source = format!("fn f(x: [f64; 6]) -> f64 {{ {} }}", terms.join(" + "));
-    let value = stacker::grow(crate::STACK, || {
+    let value = stacker::grow(crate::STACK_BYTES, || {
         let (evaluator, list) = super::evaluate(&source).unwrap();
         evaluator
             .graph
@@ -82,8 +82,9 @@ fn long_chains_are_errors() {
         (format!("{}x[0]", "-".repeat(5000)), "more than 4096 terms"),
     ] {
         let source = format!("fn f(x: [f64; 6]) -> f64 {{ {body} }}");
-        let error =
-            stacker::grow(crate::STACK, || super::evaluate(&source).map(|_| ()).map_err(|e| e.to_string()));
+        let error = stacker::grow(crate::STACK_BYTES, || {
+            super::evaluate(&source).map(|_| ()).map_err(|e| e.to_string())
+        });
         let message = error.expect_err("the chain is too long");
         assert!(message.contains(expected), "{message}");
     }

@@ -18,7 +18,7 @@ mod signature;
 
 use crate::graph::Node;
 use crate::language::{Model, Rates, Variables};
-use crate::structure::index::{self, Words};
+use crate::structure::index::{self, MatchingErrorText};
 use constraints::Constraint;
 use quote::format_ident;
 
@@ -106,7 +106,7 @@ fn signature(model: &Model) -> Vec<signature::Row> {
 fn undetermined_error(model: &Model, rows: &[signature::Row]) -> syn::Error {
     let nx = model.variables.x.len();
     let pattern: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|entry| entry.0).collect()).collect();
-    let words = Words {
+    let words = MatchingErrorText {
         name: &|unknown| match model.variables.x.get(unknown) {
             Some(name) => format!("`{name}`"),
             None => format!("`{}`", model.variables.z[unknown - nx]),

@@ -8,7 +8,7 @@ use crate::structure::{Analysis, samplings};
 use syn::{Error, Result};
 
 /// Pivots below this, relative to the largest one of a scaled matrix, count as zero.
-const ZERO: f64 = 1e-11;
+const ZERO_PIVOT_TOLERANCE: f64 = 1e-11;
 /// Elements of null vectors below this, relative to the largest one, count as zero.
 const MIN_NULL_VECTOR_ELEMENT: f64 = 1e-6;
 
@@ -82,7 +82,7 @@ fn null_vector(mut a: Vec<Vec<f64>>, wanted: bool) -> Option<Vec<f64>> {
                 }
             }
         }
-        if best.0 <= ZERO {
+        if best.0 <= ZERO_PIVOT_TOLERANCE {
             rank = step;
             break;
         }
