@@ -85,8 +85,12 @@ fn sensitivities_by_differences() -> Test {
             }
         }
     }
-    // Feedback at the first stage is the derivative of the first control.
-    assert_eq!(result.gain(0), result.du(0));
+    // Feedback at the first stage is the derivative of the first control, up to the compliance `∛ε`
+    // of active bounds: relative to the scale of the Hessian, it is multiplied by the change of the
+    // bound's force, which is below one here.
+    for (gain, derivative) in result.gain(0).iter().zip(result.du(0)) {
+        assert!((gain - derivative).abs() <= f64::EPSILON.cbrt(), "{gain} {derivative}");
+    }
     Ok(())
 }
 
