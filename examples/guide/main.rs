@@ -15,8 +15,11 @@ use std::path::PathBuf;
 
 type Picture = Result<Figure, Box<dyn Error>>;
 
+/// Solves the problem of a chapter and draws it.
+type DrawPicture = fn() -> Picture;
+
 /// The chapters with their pictures.
-const PICTURES: [(&str, fn() -> Picture); 12] = [
+const PICTURES: [(&str, DrawPicture); 12] = [
     ("first_model", pendulum::first_model),
     ("roots", integrators::roots),
     ("sensitivities", integrators::sensitivities),

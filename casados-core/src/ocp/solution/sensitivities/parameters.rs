@@ -303,6 +303,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
+/// The variables of a stage, its reference, and the multipliers of its path constraints.
+type StageArguments<'a, S, T> = (&'a <S as Shape>::ArrayV<T>, &'a [T], Option<&'a [T]>);
+
 /// Derivatives of the functions of a stage with respect to parameters.
 struct StageDerivatives<'a, T> {
     /// `∂²L/∂(x, w, u, z)∂p` for constant `z`.
@@ -339,7 +342,7 @@ impl<T: Real> StageDerivatives<'_, T> {
     fn add_direct<P: Formulation<T>>(
         &mut self,
         (cost, path): (&mut P::StageCost, &mut P::Path),
-        (point, reference, mu): (&<P::Shape as Shape>::ArrayV<T>, &[T], Option<&[T]>),
+        (point, reference, mu): StageArguments<'_, P::Shape, T>,
         (context, constraint_context): (CostContext<'_, T>, ConstraintContext<'_, T>),
         cross: &mut ParameterDerivatives<'_, T>,
         slopes: &mut [T],
