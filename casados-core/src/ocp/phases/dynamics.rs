@@ -4,8 +4,8 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
 use crate::ocp::formulation::program::curvature::{Convexification, Curvature, Exact, GaussNewton};
 
-/// The type of dynamics that a [`Curvature`] of [`Phases`] is generic over; each phase linearises
-/// its own.
+/// The type of dynamics that a [`Curvature`] of [`Phases`](super::Phases) is generic over; each
+/// phase linearises its own.
 ///
 /// No value has this type.
 ///
